@@ -1,0 +1,34 @@
+find_package(Threads REQUIRED)
+find_package(Imath REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+
+# What every target compiles with: AVX2 at least, and no fast-math, because NaN and infinity must be seen and counted.
+add_library(warpath_flags INTERFACE)
+target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -fno-math-errno -fno-trapping-math)
+
+# warpath_folder(NAME [folders and libraries it may use]...)
+# Makes the library warpath_NAME of the sources in the current folder, and NAME_test of the tests beside them.
+function(warpath_folder NAME)
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  file(GLOB tests CONFIGURE_DEPENDS *_test.cpp)
+  list(REMOVE_ITEM sources ${tests} "")
+  add_library(warpath_${NAME} STATIC ${sources})
+  target_include_directories(warpath_${NAME} PUBLIC ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
+  target_link_libraries(warpath_${NAME} PUBLIC warpath_flags ${ARGN})
+  if(WARPATH_TESTS AND tests)
+    warpath_test(${NAME}_test ${tests})
+    target_link_libraries(${NAME}_test PRIVATE warpath_${NAME})
+  endif()
+endfunction()
+
+# warpath_test(NAME SOURCES...): a GoogleTest binary, one ctest entry for each of its tests.
+function(warpath_test NAME)
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+  add_executable(${NAME} ${ARGN})
+  target_link_libraries(${NAME} PRIVATE warpath_flags GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${NAME} PRIVATE WARPATH_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${NAME} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 900)
+endfunction()

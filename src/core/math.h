@@ -1,0 +1,27 @@
+#pragma once
+#include <Imath/ImathColor.h>
+#include <Imath/ImathMatrix.h>
+#include <Imath/ImathVec.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace warpath {
+
+using Vec2 = Imath::V2f;
+using Vec3 = Imath::V3f;
+using Color = Imath::C3f;  ///< linear RGB, Rec. 709 primaries
+/// Imath's convention: row vectors, p' = p * M, so this is the transpose of the matrix in a scene file.
+using Matrix4 = Imath::M44f;
+
+inline constexpr float kPi = std::numbers::pi_v<float>;
+/// The largest float below 1: primary samples stay in [0,1).
+inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
+
+/// Luminance of linear Rec. 709 RGB (ITU-R BT.709).
+inline float luminance(const Color& c) { return 0.212671f * c.x + 0.715160f * c.y + 0.072169f * c.z; }
+inline float max_component(const Color& c) { return std::fmax(c.x, std::fmax(c.y, c.z)); }
+inline float sqr(float x) { return x * x; }
+inline float clamp01(float x) { return std::fmin(std::fmax(x, 0.0f), 1.0f); }
+
+}  // namespace warpath

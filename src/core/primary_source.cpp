@@ -1,0 +1,28 @@
+#include "core/primary_source.h"
+
+#include "core/rng.h"
+
+namespace warpath {
+
+bool UniformSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext*, float* u0, float* u1,
+                         float*) {
+  const std::uint32_t d = group.first_dimension();
+  for (std::size_t i = 0; i < lanes.size(); ++i) u0[i] = sample_float(sample_key(m_seed, m_ids[lanes[i]]), d);
+  if (u1)
+    for (std::size_t i = 0; i < lanes.size(); ++i) u1[i] = sample_float(sample_key(m_seed, m_ids[lanes[i]]), d + 1);
+  return false;
+}
+
+bool FixedSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
+                       float* u1, float* inv_q) {
+  const int column = m_layout.column(group);
+  if (column < 0) return UniformSource::draw(group, lanes, context, u0, u1, inv_q);
+  for (std::size_t i = 0; i < lanes.size(); ++i) {
+    const double* row = m_y + lanes[i] * m_stride + column;
+    u0[i] = to_primary(row[0]);
+    if (u1) u1[i] = to_primary(row[1]);
+  }
+  return false;
+}
+
+}  // namespace warpath

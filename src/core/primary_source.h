@@ -1,0 +1,68 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "warpath/layout.h"
+
+namespace warpath {
+
+/// What the tracer knows of a surface's scattering where a number is drawn.
+enum class SurfaceKind : std::uint8_t { none, diffuse, glossy, mixed, delta, null };
+
+/// What the tracer shows at a vertex when it draws numbers for a batch. Structure of arrays; entry i belongs to
+/// lanes[i] of the draw. Every array has one entry per drawn lane.
+struct VertexContext {
+  std::array<const float*, 3> position{};   ///< world space, scene units
+  std::array<const float*, 3> normal{};     ///< shading normal, unit, on the side of wi
+  std::array<const float*, 3> wi{};         ///< unit, towards the previous vertex
+  std::array<const float*, 3> albedo{};     ///< approximate reflectance, linear RGB
+  const float* roughness = nullptr;         ///< 0 delta ... 1 diffuse
+  const std::uint8_t* kind = nullptr;       ///< SurfaceKind
+  const std::uint32_t* material = nullptr;  ///< index of the BSDF in the scene
+};
+
+/// The one door: every random number inside the tracer comes from here, a group at a time, for a whole batch of paths,
+/// at the moment when it is needed. A source belongs to one batch on one thread.
+class PrimarySource {
+ public:
+  virtual ~PrimarySource() = default;
+  /// Numbers of `group` for the paths `lanes` (strictly ascending indices into the batch). context is null for film, lens and
+  /// time. u0 and u1 (null for groups of one number) and inv_q get one entry per lane. Returns false if every inv_q is
+  /// 1; then inv_q is not written. The tracer multiplies the inv_q of light groups into that one light-sampling term,
+  /// and that of all others into all that follows. Roulette never sees inv_q, so that f stays a function of y.
+  virtual bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
+                    float* u1, float* inv_q) = 0;
+};
+
+/// Uniform numbers from the counter-based streams of the samples `ids`.
+class UniformSource : public PrimarySource {
+ public:
+  /// seed and ids name the samples; lane i is sample ids[i].
+  UniformSource(std::uint64_t seed, std::span<const std::uint64_t> ids) : m_seed(seed), m_ids(ids) {}
+  bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
+            float* inv_q) override;
+
+ private:
+  std::uint64_t m_seed;
+  std::span<const std::uint64_t> m_ids;
+};
+
+/// Hands out a given y for the groups of a layout, and uniform numbers for all others: inv_q is 1 throughout. With it
+/// the tracer is the integrand f(y).
+class FixedSource : public UniformSource {
+ public:
+  /// y: one row per lane, columns as in `layout`, row-major with `stride` doubles between rows. Views: not copied.
+  FixedSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const Layout& layout, const double* y,
+              std::size_t stride)
+      : UniformSource(seed, ids), m_layout(layout), m_y(y), m_stride(stride) {}
+  bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
+            float* inv_q) override;
+
+ private:
+  const Layout& m_layout;
+  const double* m_y;
+  std::size_t m_stride;
+};
+
+}  // namespace warpath

@@ -1,0 +1,34 @@
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "core/primary_source.h"
+
+namespace warpath {
+
+/// All vertices of one bounce of a finished batch: the training data of conditional warps. Entry i belongs to the path
+/// lanes[i]. Arrays live until record() returns.
+struct VertexRecords {
+  std::uint16_t bounce = 0;
+  std::span<const std::uint32_t> lanes;
+  VertexContext context;
+  /// light, light_uv x 2, lobe, dir x 2, rr: the numbers that were handed out
+  std::array<const float*, kBounceDimensions> numbers{};
+  const float* inv_q_light = nullptr;    ///< product over light and light_uv
+  const float* inv_q_scatter = nullptr;  ///< product over lobe and dir
+  /// Luminance that the light-sampling term added, divided by the throughput (with inv_q) of the path before the vertex,
+  /// including inv_q_light.
+  const float* light = nullptr;
+  /// Luminance that came back through the sampled direction, from all that is beyond, divided likewise, including
+  /// inv_q_scatter.
+  const float* beyond = nullptr;
+};
+
+/// Attached to a trace, it is shown every vertex when the batch is done, bounce by bounce.
+class VertexRecorder {
+ public:
+  virtual ~VertexRecorder() = default;
+  virtual void record(const VertexRecords& records) = 0;
+};
+
+}  // namespace warpath

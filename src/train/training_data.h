@@ -1,0 +1,31 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "warpath/batch.h"
+#include "warpath/integrand.h"
+#include "warpath/layout.h"
+
+namespace warpath {
+
+/// Uniform primary samples with their target values (the candidate set T of [ZZ19]). Only the target of each is kept:
+/// its y is a function of (seed, id) and is made again when it is needed, so a candidate costs 4 bytes.
+struct Candidates {
+  Layout layout;
+  std::uint64_t seed = 0;
+  std::vector<float> target;       ///< g >= 0 of candidate id = 0, 1, ...; non-finite ones are stored as 0
+  std::uint64_t non_finite = 0;    ///< how many were not finite
+  double seconds = 0;              ///< wall time that it took
+  std::size_t size() const { return target.size(); }
+  /// y of candidate `id`: layout.dims() numbers.
+  void primary_sample(std::uint64_t id, float* y) const;
+};
+
+/// Examples that a density is fitted to: y with a weight each. Resampled examples all weigh 1.
+struct Examples {
+  Matrix<float> y;            ///< N x D
+  std::vector<float> weight;  ///< N; the target g, or 1 after resampling
+};
+
+}  // namespace warpath
