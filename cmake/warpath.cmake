@@ -3,6 +3,11 @@ find_package(Imath REQUIRED)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
+# Debian's OpenImageIO lists the headers of OpenCV, which it needs for itself alone and which need not be installed.
+find_package(OpenImageIO REQUIRED GLOBAL)
+get_target_property(openimageio_includes OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)
+list(FILTER openimageio_includes EXCLUDE REGEX opencv)
+set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${openimageio_includes}")
 
 # What every target compiles with: AVX2 at least, and no fast-math, because NaN and infinity must be seen and counted.
 add_library(warpath_flags INTERFACE)
