@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 namespace warpath {
 
@@ -45,6 +46,6 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
   do {                                                                                                 \
     const auto check_a = (a);                                                                          \
     const auto check_b = (b);                                                                          \
-    if (!(check_a == static_cast<decltype(check_a)>(check_b)))                                         \
+    if (!(check_a == static_cast<std::remove_cv_t<decltype(check_a)>>(check_b)))                                         \
       ::warpath::detail::check_failed(__FILE__, __LINE__, #a " == " #b, check_a, check_b);             \
   } while (0)

@@ -50,7 +50,7 @@ class UniformSource : public PrimarySource {
 
 /// Hands out a given y for the groups of a layout, and uniform numbers for all others: inv_q is 1 throughout. With it
 /// the tracer is the integrand f(y).
-class FixedSource : public UniformSource {
+class FixedSource final : public UniformSource {
  public:
   /// y: one row per lane, columns as in `layout`, row-major with `stride` doubles between rows. Views: not copied.
   FixedSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const Layout& layout, const double* y,

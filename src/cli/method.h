@@ -1,0 +1,49 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "tracer/tracer.h"
+#include "train/training_data.h"
+#include "warpath/layout.h"
+#include "warpath/train.h"
+
+namespace warpath {
+
+/// A way to draw the numbers of paths, as it is named on the command line: `none`, FAMILY[:DIMS], or a warp file.
+struct Method {
+  std::string name;            ///< as typed
+  std::string family;          ///< `none`, `uniform`, `grid`, ...
+  Layout layout;               ///< empty for `none`
+  std::filesystem::path file;  ///< of a trained warp; empty if it is trained now
+};
+/// Throws ConfigError that lists the families, or FileError if a warp file cannot be read.
+Method parse_method(const std::string& text);
+
+/// A method that is ready to render.
+struct PreparedMethod {
+  std::shared_ptr<const Proposal> proposal;  ///< null for `none`
+  TrainLog log;
+  std::shared_ptr<const Candidates> candidates;  ///< null if it was not trained now
+  double candidate_seconds = 0;
+};
+
+/// Gathers candidates and trains. Candidates are kept, so that methods over the same dimensions learn from the same ones.
+class MethodTrainer {
+ public:
+  MethodTrainer(const Tracer& tracer, const TrainSettings& settings, std::filesystem::path init, bool quiet)
+      : m_tracer(tracer), m_settings(settings), m_init(std::move(init)), m_quiet(quiet) {}
+  PreparedMethod prepare(const Method& method);
+
+ private:
+  std::shared_ptr<const Candidates> candidates(const Layout& layout, std::uint64_t count);
+
+  const Tracer& m_tracer;
+  TrainSettings m_settings;
+  std::filesystem::path m_init;
+  bool m_quiet;
+  std::map<std::string, std::shared_ptr<const Candidates>> m_candidates;  // by layout
+};
+
+}  // namespace warpath

@@ -1,0 +1,258 @@
+#include "estimate/image_estimator.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/rng.h"
+#include "estimate/warped_source.h"
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Lanes of one wavefront: enough to fill SIMD kernels and to sort rays, few enough to stay in L2.
+constexpr std::size_t kBatch = 2048;
+/// Side of the square of pixels that is rendered together, so that camera rays of a batch are coherent.
+constexpr int kTile = 8;
+/// Camera rays for directly seen emission, per path: its edges would else be all that one sees of a noisy film.
+constexpr int kEmissionRays = 4;
+
+// Streams of one seed that must not repeat each other's numbers.
+constexpr std::uint64_t kLatentStream = 0x6c6174656e740001u;
+constexpr std::uint64_t kEmissionStream = 0x656d697373690002u;
+// Numbers of a latent's stream beyond those that stand for the dimensions of a path.
+constexpr std::uint32_t kComponentDimension = 0xfffffffeu;
+
+/// Everything that a batch needs, kept from batch to batch.
+struct Job {
+  std::vector<std::uint64_t> ids;
+  std::vector<std::uint32_t> pixels;
+  Matrix<double> y;
+  std::vector<double> u, log_q;
+  std::vector<float> inv_q, film_x, film_y;
+  PathResults results;
+  double warp_seconds = 0, trace_seconds = 0;
+};
+
+/// Pixels of the crop window, tile by tile.
+std::vector<std::uint32_t> tiled_pixels(int width, int height) {
+  std::vector<std::uint32_t> pixels;
+  pixels.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y0 = 0; y0 < height; y0 += kTile)
+    for (int x0 = 0; x0 < width; x0 += kTile)
+      for (int y = y0; y < std::min(height, y0 + kTile); ++y)
+        for (int x = x0; x < std::min(width, x0 + kTile); ++x)
+          pixels.push_back(static_cast<std::uint32_t>(y * width + x));
+  return pixels;
+}
+
+/// Pixels within `radius` of one that is marked.
+std::vector<std::uint8_t> dilate(const std::vector<std::uint8_t>& mask, int width, int height, int radius) {
+  std::vector<std::uint8_t> wide(mask.size());
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      if (!mask[static_cast<std::size_t>(y * width + x)]) continue;
+      for (int j = std::max(0, y - radius); j <= std::min(height - 1, y + radius); ++j)
+        for (int i = std::max(0, x - radius); i <= std::min(width - 1, x + radius); ++i)
+          wide[static_cast<std::size_t>(j * width + i)] = 1;
+    }
+  return wide;
+}
+
+/// A position in [0,1) over the film from a pixel and an offset inside it; rounding must not carry it into the next pixel.
+float film_position(std::uint32_t pixel, float offset, int size) {
+  const float lowest = static_cast<float>(pixel), next = std::nextafter(lowest + 1, 0.0f);
+  return std::min(std::min(lowest + offset, next) / static_cast<float>(size), kOneMinusEpsilon);
+}
+
+void add_to_film(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t lanes) {
+  const auto crop_x = static_cast<float>(settings.crop_x), crop_y = static_cast<float>(settings.crop_y);
+  for (std::size_t i = 0; i < lanes; ++i)
+    film.add(results.film_x[i] - crop_x, results.film_y[i] - crop_y, results.radiance[i]);
+}
+
+}  // namespace
+
+ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal,
+                               std::uint64_t seed)
+    : m_tracer(tracer),
+      m_layout(std::move(layout)),
+      m_proposal(std::move(proposal)),
+      m_seed(seed),
+      m_joint(m_layout.contains({GroupKind::film})),
+      m_film(tracer.scene().film, m_joint ? Film::Weights::expected : Film::Weights::sampled) {
+  if (m_proposal) WARPATH_CHECK_EQ(m_proposal->dims(), m_layout.dims());
+  const FilmSettings& film = tracer.scene().film;
+  m_pixels = tiled_pixels(film.crop_width, film.crop_height);
+  const int reach = static_cast<int>(std::ceil(film.filter.radius + 0.5f));
+  const auto may_see = dilate(tracer.may_see_emission(), film.crop_width, film.crop_height, reach);
+  for (const std::uint32_t pixel : m_pixels)
+    if (may_see[pixel]) m_emission_pixels.push_back(pixel);
+  if (!m_emission_pixels.empty()) m_emission.emplace(film, Film::Weights::sampled);
+}
+
+void ImageEstimator::add_pass(int spp, const Progress& progress, const std::function<bool()>& stop) {
+  add_emission(kEmissionRays * spp, stop);
+  add_paths(spp, progress, stop);
+}
+
+void ImageEstimator::add_paths(int spp, const Progress& progress, const std::function<bool()>& stop) {
+  const FilmSettings& film = m_tracer.scene().film;
+  const std::size_t pixels = m_pixels.size(), per_pixel = static_cast<std::size_t>(spp);
+  const auto dims = static_cast<std::size_t>(m_layout.dims());
+  const auto first = static_cast<std::uint64_t>(m_passes_spp);
+  const std::uint64_t latent_seed = mix64(m_seed ^ kLatentStream);
+  m_passes_spp += spp;
+
+  // Stratified film: a batch is a run of pixels, all samples of each, or a part of the samples of a few pixels.
+  const std::size_t run = std::clamp<std::size_t>(kBatch / per_pixel, kTile, kBatch);
+  const std::size_t depth = std::min(per_pixel, std::max<std::size_t>(1, kBatch / run));
+  const std::size_t runs = (pixels + run - 1) / run, layers = (per_pixel + depth - 1) / depth;
+  const std::size_t total = pixels * per_pixel;
+  const std::size_t batches = m_joint ? (total + kBatch - 1) / kBatch : runs * layers;
+
+  const auto number_samples = [&](Job& job, std::size_t batch) {
+    job.ids.clear();
+    job.pixels.clear();
+    if (m_joint) {
+      const std::size_t begin = batch * kBatch, end = std::min(total, begin + kBatch);
+      for (std::size_t i = begin; i < end; ++i) job.ids.push_back(first * pixels + i);
+      return;
+    }
+    const std::size_t p0 = batch / layers * run, p1 = std::min(pixels, p0 + run);
+    const std::size_t s0 = batch % layers * depth, s1 = std::min(per_pixel, s0 + depth);
+    for (std::size_t s = s0; s < s1; ++s)
+      for (std::size_t p = p0; p < p1; ++p) {
+        job.ids.push_back((first + s) * pixels + m_pixels[p]);
+        job.pixels.push_back(m_pixels[p]);
+      }
+  };
+  const auto place_on_film = [&](Job& job) {
+    const std::uint32_t d = Group{GroupKind::film}.first_dimension();
+    const auto width = static_cast<std::uint32_t>(film.crop_width);
+    for (std::size_t i = 0; i < job.pixels.size(); ++i) {
+      const std::uint64_t key = sample_key(m_seed, job.ids[i]);
+      job.film_x[i] = film_position(job.pixels[i] % width, sample_float(key, d), film.crop_width);
+      job.film_y[i] = film_position(job.pixels[i] / width, sample_float(key, d + 1), film.crop_height);
+    }
+  };
+  const auto draw_primary_samples = [&](Job& job) {
+    const std::size_t n = job.ids.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::uint64_t key = sample_key(latent_seed, job.ids[i]);
+      for (std::size_t c = 0; c < dims; ++c)
+        job.y(i, c) = sample_double(key, m_layout.dimension(static_cast<int>(c)));
+      // Stratified over the batch: the share of each component is the same in every batch.
+      job.u[i] = (static_cast<double>(i) + sample_double(key, kComponentDimension)) / static_cast<double>(n);
+    }
+    const auto y = job.y.batch().rows_from(0, n);
+    m_proposal->sample(y, std::span(job.u).first(n), y, std::span(job.log_q).first(n));
+    for (std::size_t i = 0; i < n; ++i) job.inv_q[i] = static_cast<float>(std::exp(-job.log_q[i]));
+  };
+
+  double warp_seconds = 0, trace_seconds = 0;
+  const auto start = Clock::now();
+  const auto work = [&](Job& job, std::size_t batch) {
+    const auto begin = Clock::now();
+    number_samples(job, batch);
+    const std::size_t n = job.ids.size();
+    job.film_x.resize(m_joint ? 0 : n);
+    job.film_y.resize(m_joint ? 0 : n);
+    if (m_proposal) {
+      if (job.y.rows() < n) job.y = Matrix<double>(std::max(n, kBatch), dims);
+      job.u.resize(std::max(n, kBatch));
+      job.log_q.resize(std::max(n, kBatch));
+      job.inv_q.resize(n);
+      draw_primary_samples(job);
+    }
+    job.warp_seconds = m_proposal ? seconds_since(begin) : 0;
+    if (!m_joint) place_on_film(job);
+    static const Layout uniform;
+    WarpedSource source(m_seed, job.ids, m_proposal ? m_layout : uniform, job.y.batch(),
+                        m_proposal ? std::span<const float>(job.inv_q) : std::span<const float>(), job.film_x,
+                        job.film_y);
+    m_tracer.trace(source, n, job.results);
+    job.trace_seconds = seconds_since(begin) - job.warp_seconds;
+  };
+  const auto merge = [&](Job& job, std::size_t batch) {
+    const auto begin = Clock::now();
+    add_to_film(m_film, film, job.results, job.ids.size());
+    m_cost.samples += job.ids.size();
+    warp_seconds += job.warp_seconds;
+    trace_seconds += job.trace_seconds + seconds_since(begin);
+    if (progress) progress(static_cast<double>(batch + 1) / static_cast<double>(batches));
+  };
+  run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });
+
+  const double wall = seconds_since(start), thread_time = std::max(1e-12, warp_seconds + trace_seconds);
+  m_cost.warp_seconds += wall * warp_seconds / thread_time;
+  m_cost.trace_seconds += wall * trace_seconds / thread_time;
+}
+
+void ImageEstimator::add_emission(int rays, const std::function<bool()>& stop) {
+  if (!m_emission) return;
+  const FilmSettings& film = m_tracer.scene().film;
+  const auto start = Clock::now();
+  // A jittered grid inside each pixel, of at least `rays` cells.
+  const int nx = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(rays)))), ny = (rays + nx - 1) / nx;
+  const auto cells = static_cast<std::size_t>(nx * ny);
+  const std::size_t total = m_emission_pixels.size() * cells, batches = (total + kBatch - 1) / kBatch;
+  const std::uint64_t seed = mix64(m_seed ^ kEmissionStream);
+  const std::uint64_t first_id = m_emission_rays;
+  m_emission_rays += total;
+
+  const auto work = [&](Job& job, std::size_t batch) {
+    const std::size_t begin = batch * kBatch, n = std::min(total, begin + kBatch) - begin;
+    job.ids.resize(n);
+    job.film_x.resize(n);
+    job.film_y.resize(n);
+    const std::uint32_t d = Group{GroupKind::film}.first_dimension();
+    const auto width = static_cast<std::uint32_t>(film.crop_width);
+    for (std::size_t i = 0; i < n; ++i) {
+      job.ids[i] = first_id + begin + i;
+      const std::uint32_t pixel = m_emission_pixels[(begin + i) / cells];
+      const auto cell = static_cast<int>((begin + i) % cells);
+      const std::uint64_t key = sample_key(seed, job.ids[i]);
+      const float x = (static_cast<float>(cell % nx) + sample_float(key, d)) / static_cast<float>(nx);
+      const float y = (static_cast<float>(cell / nx) + sample_float(key, d + 1)) / static_cast<float>(ny);
+      job.film_x[i] = film_position(pixel % width, x, film.crop_width);
+      job.film_y[i] = film_position(pixel / width, y, film.crop_height);
+    }
+    static const Layout uniform;
+    WarpedSource source(seed, job.ids, uniform, {}, {}, job.film_x, job.film_y);
+    m_tracer.trace_emission(source, n, job.results);
+  };
+  const auto merge = [&](Job& job, std::size_t) {
+    add_to_film(*m_emission, film, job.results, job.ids.size());
+    m_cost.emission_rays += job.ids.size();
+  };
+  run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });
+  m_cost.emission_seconds += seconds_since(start);
+}
+
+ImageEstimate ImageEstimator::develop_rest() const { return m_film.develop(); }
+
+ImageEstimate ImageEstimator::develop() const {
+  ImageEstimate image = m_film.develop();
+  if (!m_emission) return image;
+  const ImageEstimate emission = m_emission->develop();
+  for (std::size_t p = 0; p < image.mean.size(); ++p) {
+    image.mean[p] += emission.mean[p];
+    image.variance[p] += emission.variance[p];
+  }
+  return image;
+}
+
+double ImageEstimator::spp() const {
+  return static_cast<double>(m_cost.samples) / static_cast<double>(m_pixels.size());
+}
+
+std::uint64_t ImageEstimator::non_finite() const {
+  return m_film.non_finite() + (m_emission ? m_emission->non_finite() : 0);
+}
+
+}  // namespace warpath

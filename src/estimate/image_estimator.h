@@ -1,0 +1,65 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/ordered.h"
+#include "estimate/film.h"
+#include "tracer/tracer.h"
+#include "warpath/layout.h"
+#include "warpath/warp.h"
+
+namespace warpath {
+
+/// Where a render's time went. Thread time is shared out over the wall time of the passes.
+struct RenderCost {
+  std::uint64_t samples = 0;       ///< paths
+  std::uint64_t emission_rays = 0; ///< camera rays for directly seen emission
+  double warp_seconds = 0;         ///< drawing numbers with their density
+  double trace_seconds = 0;        ///< tracing and splatting
+  double emission_seconds = 0;
+  double total() const { return warp_seconds + trace_seconds + emission_seconds; }
+};
+
+/// Renders one image with one proposal, pass after pass.  [ZZ19, the warped estimator: C(y) W_j / q(y)]
+///
+/// If the layout holds `film`, samples fall where the proposal puts them, and every pixel's divisor is what uniform
+/// positions would have brought (unbiased); else every pixel has its own samples, and weights are divided out as they
+/// fell (consistent, as Mitsuba does it). Directly seen emission is estimated apart, by camera rays of its own.
+class ImageEstimator {
+ public:
+  /// The tracer must outlive the estimator. proposal: null draws all numbers uniformly; else proposal->dims() ==
+  /// layout.dims(). The same seed gives the same bits for any number of threads, if the passes are the same.
+  ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal, std::uint64_t seed);
+
+  /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and 4 x spp camera rays to each pixel
+  /// that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
+  void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
+
+  ImageEstimate develop() const;       ///< the whole image
+  ImageEstimate develop_rest() const;  ///< without directly seen emission
+  double spp() const;                  ///< samples per pixel so far
+  std::uint64_t non_finite() const;
+  const RenderCost& cost() const { return m_cost; }
+
+ private:
+  void add_paths(int spp, const Progress& progress, const std::function<bool()>& stop);
+  void add_emission(int rays, const std::function<bool()>& stop);
+
+  const Tracer& m_tracer;
+  Layout m_layout;
+  std::shared_ptr<const Proposal> m_proposal;
+  std::uint64_t m_seed;
+  bool m_joint;                               // the film is among the warped dimensions
+  std::vector<std::uint32_t> m_pixels;        // in the order in which they are rendered: compact tiles
+  std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
+  Film m_film;
+  std::optional<Film> m_emission;
+  int m_passes_spp = 0;                       // samples per pixel begun so far: numbers the samples
+  std::uint64_t m_emission_rays = 0;
+  RenderCost m_cost;
+};
+
+}  // namespace warpath
