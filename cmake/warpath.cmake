@@ -14,11 +14,11 @@ add_library(warpath_flags INTERFACE)
 target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -fno-math-errno -fno-trapping-math)
 
 # warpath_folder(NAME [folders and libraries it may use]...)
-# Makes the library warpath_NAME of the sources in the current folder, and NAME_test of the tests beside them.
+# Makes the library warpath_NAME of the sources in the current folder (but not main.cpp), and NAME_test of the tests beside them.
 function(warpath_folder NAME)
   file(GLOB sources CONFIGURE_DEPENDS *.cpp)
   file(GLOB tests CONFIGURE_DEPENDS *_test.cpp)
-  list(REMOVE_ITEM sources ${tests} "")
+  list(REMOVE_ITEM sources ${tests} ${CMAKE_CURRENT_SOURCE_DIR}/main.cpp "")
   add_library(warpath_${NAME} STATIC ${sources})
   target_include_directories(warpath_${NAME} PUBLIC ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(warpath_${NAME} PUBLIC warpath_flags ${ARGN})

@@ -29,7 +29,8 @@ struct PreparedMethod {
   double candidate_seconds = 0;
 };
 
-/// Gathers candidates and trains. Candidates are kept, so that methods over the same dimensions learn from the same ones.
+/// Gathers candidates and trains. Candidates are kept, so that methods over the same dimensions learn from the same
+/// ones.
 class MethodTrainer {
  public:
   MethodTrainer(const Tracer& tracer, const TrainSettings& settings, std::filesystem::path init, bool quiet)

@@ -97,7 +97,8 @@ void TrainingOptions::add_to(CLI::App& app) {
   add_nvp("--max-steps", settings.realnvp.max_steps, "Training steps at most")->check(CLI::NonNegativeNumber);
 
   constexpr auto kTree = "kd-tree and grid";
-  app.add_option("--kdtree-target", m_kdtree_target, "A cell's density follows: mean g, or rms, the root of its mean square")
+  app.add_option("--kdtree-target", m_kdtree_target,
+                 "A cell's density follows: mean g, or rms, the root of its mean square")
       ->group(kTree)
       ->capture_default_str()
       ->check(CLI::IsMember({"mean", "rms"}));
@@ -123,7 +124,8 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
 }
 
 void RenderOptions::add_to(CLI::App& app) {
-  auto* by_samples = app.add_option("--spp", spp, "Samples per pixel (default: the scene's)")->check(CLI::Range(1, 1 << 24));
+  auto* by_samples =
+      app.add_option("--spp", spp, "Samples per pixel (default: the scene's)")->check(CLI::Range(1, 1 << 24));
   app.add_option("--time", time, "Seconds for everything after loading, training included")
       ->check(CLI::PositiveNumber)
       ->excludes(by_samples);
@@ -137,7 +139,8 @@ Scene load_scene(const CommonOptions& common, const RenderOptions* render) {
     FilmSettings& film = scene.film;
     if (crop[0] < 0 || crop[1] < 0 || crop[2] < 1 || crop[3] < 1 || crop[0] + crop[2] > film.width ||
         crop[1] + crop[3] > film.height)
-      throw ConfigError(fmt::format("--crop: {} is not inside the film of {}x{}", render->crop, film.width, film.height));
+      throw ConfigError(
+          fmt::format("--crop: {} is not inside the film of {}x{}", render->crop, film.width, film.height));
     film.crop_x = crop[0];
     film.crop_y = crop[1];
     film.crop_width = crop[2];

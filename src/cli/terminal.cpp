@@ -13,7 +13,9 @@ namespace warpath {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double seconds_between(Clock::time_point a, Clock::time_point b) { return std::chrono::duration<double>(b - a).count(); }
+double seconds_between(Clock::time_point a, Clock::time_point b) {
+  return std::chrono::duration<double>(b - a).count();
+}
 
 std::string duration(double seconds) {
   const int whole = static_cast<int>(std::min(seconds, 1e6) + 0.5);

@@ -48,8 +48,7 @@ void Film::add(float x, float y, const Color& value) {
 
   for (int j = y0; j <= y1; ++j)
     for (int i = x0; i <= x1; ++i) {
-      const double w =
-          m_weight_x[static_cast<std::size_t>(i - x0)] * m_weight_y[static_cast<std::size_t>(j - y0)];
+      const double w = m_weight_x[static_cast<std::size_t>(i - x0)] * m_weight_y[static_cast<std::size_t>(j - y0)];
       Sums& s = m_sums[static_cast<std::size_t>(j * m_width + i)];
       s.w += w;
       s.w2 += w * w;

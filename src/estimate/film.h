@@ -26,8 +26,8 @@ class Film {
   };
   Film(const FilmSettings& settings, Weights weights);
 
-  /// One sample at (x, y), in pixels from the corner of the crop window. A value that is not finite counts as 0, stays in
-  /// the divisor, and is counted.
+  /// One sample at (x, y), in pixels from the corner of the crop window. A value that is not finite counts as 0, stays
+  /// in the divisor, and is counted.
   void add(float x, float y, const Color& value);
   /// Samples that fell at (x, y) with value 0 and need no splat under Weights::expected.
   void count(std::uint64_t samples) { m_samples += samples; }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "estimate/film_positions.h"
 #include "estimate/warped_source.h"
 #include "warpath/error.h"
 
@@ -61,12 +62,6 @@ std::vector<std::uint8_t> dilate(const std::vector<std::uint8_t>& mask, int widt
           wide[static_cast<std::size_t>(j * width + i)] = 1;
     }
   return wide;
-}
-
-/// A position in [0,1) over the film from a pixel and an offset inside it; rounding must not carry it into the next pixel.
-float film_position(std::uint32_t pixel, float offset, int size) {
-  const float lowest = static_cast<float>(pixel), next = std::nextafter(lowest + 1, 0.0f);
-  return std::min(std::min(lowest + offset, next) / static_cast<float>(size), kOneMinusEpsilon);
 }
 
 void add_to_film(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t lanes) {
@@ -144,8 +139,7 @@ void ImageEstimator::add_paths(int spp, const Progress& progress, const std::fun
     const std::size_t n = job.ids.size();
     for (std::size_t i = 0; i < n; ++i) {
       const std::uint64_t key = sample_key(latent_seed, job.ids[i]);
-      for (std::size_t c = 0; c < dims; ++c)
-        job.y(i, c) = sample_double(key, m_layout.dimension(static_cast<int>(c)));
+      for (std::size_t c = 0; c < dims; ++c) job.y(i, c) = sample_double(key, m_layout.dimension(static_cast<int>(c)));
       // Stratified over the batch: the share of each component is the same in every batch.
       job.u[i] = (static_cast<double>(i) + sample_double(key, kComponentDimension)) / static_cast<double>(n);
     }

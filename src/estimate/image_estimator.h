@@ -15,10 +15,10 @@ namespace warpath {
 
 /// Where a render's time went. Thread time is shared out over the wall time of the passes.
 struct RenderCost {
-  std::uint64_t samples = 0;       ///< paths
-  std::uint64_t emission_rays = 0; ///< camera rays for directly seen emission
-  double warp_seconds = 0;         ///< drawing numbers with their density
-  double trace_seconds = 0;        ///< tracing and splatting
+  std::uint64_t samples = 0;        ///< paths
+  std::uint64_t emission_rays = 0;  ///< camera rays for directly seen emission
+  double warp_seconds = 0;          ///< drawing numbers with their density
+  double trace_seconds = 0;         ///< tracing and splatting
   double emission_seconds = 0;
   double total() const { return warp_seconds + trace_seconds + emission_seconds; }
 };
@@ -34,8 +34,8 @@ class ImageEstimator {
   /// layout.dims(). The same seed gives the same bits for any number of threads, if the passes are the same.
   ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal, std::uint64_t seed);
 
-  /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and 4 x spp camera rays to each pixel
-  /// that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
+  /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and 4 x spp camera rays to each
+  /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
   ImageEstimate develop() const;       ///< the whole image
@@ -52,12 +52,12 @@ class ImageEstimator {
   Layout m_layout;
   std::shared_ptr<const Proposal> m_proposal;
   std::uint64_t m_seed;
-  bool m_joint;                               // the film is among the warped dimensions
-  std::vector<std::uint32_t> m_pixels;        // in the order in which they are rendered: compact tiles
+  bool m_joint;                                  // the film is among the warped dimensions
+  std::vector<std::uint32_t> m_pixels;           // in the order in which they are rendered: compact tiles
   std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
   Film m_film;
   std::optional<Film> m_emission;
-  int m_passes_spp = 0;                       // samples per pixel begun so far: numbers the samples
+  int m_passes_spp = 0;  // samples per pixel begun so far: numbers the samples
   std::uint64_t m_emission_rays = 0;
   RenderCost m_cost;
 };

@@ -1,0 +1,85 @@
+#include "cli/method.h"
+
+#include <array>
+
+#include "cli/terminal.h"
+#include "core/rng.h"
+#include "integrand/path_integrand.h"
+#include "train/candidates.h"
+#include "train/train.h"
+#include "warp/warp_file.h"
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+constexpr std::array<std::string_view, 5> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp"};
+constexpr std::string_view kDefaultDimensions = "film+bounce1";
+
+/// Candidates are drawn from other numbers than the image, whatever its seed.
+constexpr std::uint64_t kCandidateStream = 0x63616e6469640003u;
+
+}  // namespace
+
+Method parse_method(const std::string& text) {
+  Method method;
+  method.name = text;
+  const std::size_t colon = text.find(':');
+  method.family = text.substr(0, colon);
+  if (std::find(kFamilies.begin(), kFamilies.end(), method.family) == kFamilies.end()) {
+    if (!std::filesystem::exists(text))
+      throw ConfigError(fmt::format("unknown warp \"{}\", neither a family nor a file;{}", text,
+                                    suggestion(method.family, kFamilies)));
+    method.file = text;
+    const WarpFile file = load_warp(text);
+    method.family = file.proposal->family();
+    method.layout = file.layout;
+    return method;
+  }
+  if (method.family == "none") {
+    if (colon != std::string::npos)
+      throw ConfigError(fmt::format("\"{}\": `none` has no dimensions; uniform:{} draws those at random", text,
+                                    text.substr(colon + 1)));
+    return method;
+  }
+  method.layout =
+      Layout::parse(colon == std::string::npos ? kDefaultDimensions : std::string_view(text).substr(colon + 1));
+  return method;
+}
+
+std::shared_ptr<const Candidates> MethodTrainer::candidates(const Layout& layout, std::uint64_t count) {
+  auto& known = m_candidates[layout.name()];
+  if (known && known->size() == count) return known;
+  const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
+  StageProgress progress(fmt::format("candidates for {}", layout.name()), m_quiet);
+  const PathIntegrand integrand(m_tracer, layout, seed);
+  known = std::make_shared<Candidates>(gather_candidates(integrand, layout, seed, count, progress.callback()));
+  return known;
+}
+
+PreparedMethod MethodTrainer::prepare(const Method& method) {
+  PreparedMethod prepared;
+  if (method.family == "none") return prepared;
+  if (!method.file.empty()) {
+    prepared.proposal = load_warp(method.file).proposal;
+    return prepared;
+  }
+  TrainSettings settings = m_settings;
+  settings.family = method.family;
+  if (method.family != "uniform") {
+    prepared.candidates =
+        candidates(method.layout, static_cast<std::uint64_t>(static_cast<double>(settings.examples) * settings.alpha));
+    prepared.candidate_seconds = prepared.candidates->seconds;
+  }
+  std::shared_ptr<const Proposal> init;
+  if (!m_init.empty()) init = load_warp(m_init).proposal;
+  Candidates none;
+  none.layout = method.layout;
+  StageProgress progress(fmt::format("training {}", method.name), m_quiet || !prepared.candidates);
+  Fit fit = train(prepared.candidates ? *prepared.candidates : none, settings, init.get());
+  prepared.proposal = std::move(fit.proposal);
+  prepared.log = std::move(fit.log);
+  return prepared;
+}
+
+}  // namespace warpath

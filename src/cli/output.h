@@ -1,0 +1,45 @@
+#pragma once
+#include <tbb/global_control.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "cli/method.h"
+#include "cli/options.h"
+#include "cli/render_loop.h"
+#include "estimate/image_estimator.h"
+#include "report/image.h"
+
+namespace warpath {
+
+/// While it lives, no more threads than --threads asks for are used, and messages are as loud as --verbose or --quiet.
+class Threads {
+ public:
+  explicit Threads(const CommonOptions& common);
+  int count() const { return m_count; }
+
+ private:
+  int m_count;
+  tbb::global_control m_control;
+};
+
+/// A clock that starts now; a call tells the seconds since.
+std::function<double()> start_clock();
+/// The budget of the options; `scene_spp` where they say nothing. Time runs from now.
+Budget make_budget(const RenderOptions& options, int scene_spp);
+
+enum class Aov { albedo, normal, depth };
+/// `albedo,normal`; throws ConfigError on an unknown one.
+std::vector<Aov> parse_aovs(const std::string& list);
+
+ImageRgb image_rgb(const ImageEstimate& estimate);
+/// Mean, with `variance.R`, `.G`, `.B` (of the mean) and `samples.Y`.
+ImageFile image_file(const ImageEstimate& estimate);
+/// Attributes that say how the image was made.
+void describe(ImageFile& file, const Tracer& tracer, const Method& method, const CommonOptions& common,
+              const ImageEstimator& estimator, double seconds);
+/// Renders the layers with 16 camera rays a pixel.
+void add_aovs(ImageFile& file, const Tracer& tracer, const std::vector<Aov>& aovs, std::uint64_t seed);
+
+}  // namespace warpath
