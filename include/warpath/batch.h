@@ -15,11 +15,7 @@ class Batch {
       : m_data(data), m_rows(rows), m_cols(cols), m_stride(stride) {}
   Batch(T* data, std::size_t rows, std::size_t cols) : Batch(data, rows, cols, cols) {}
   /// A view of numbers to write is also a view of numbers to read.
-  operator Batch<const T>() const
-    requires(!std::is_const_v<T>)
-  {
-    return {m_data, m_rows, m_cols, m_stride};
-  }
+  operator Batch<const T>() const requires(!std::is_const_v<T>) { return {m_data, m_rows, m_cols, m_stride}; }
 
   std::size_t rows() const { return m_rows; }
   std::size_t cols() const { return m_cols; }

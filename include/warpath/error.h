@@ -13,7 +13,8 @@ namespace warpath {
 struct ConfigError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
-/// A scene, warp or image file that cannot be used; the text starts with file:line:column. The command line exits with 3.
+/// A scene, warp or image file that cannot be used; the text starts with file:line:column. The command line exits
+/// with 3.
 struct FileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -38,14 +39,14 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
 
 }  // namespace warpath
 
-#define WARPATH_CHECK(cond)                                                                                  \
-  do {                                                                                                       \
+#define WARPATH_CHECK(cond)                                                                                         \
+  do {                                                                                                              \
     if (!(cond)) throw ::warpath::InternalError(fmt::format("{}:{}: check failed: {}", __FILE__, __LINE__, #cond)); \
   } while (0)
-#define WARPATH_CHECK_EQ(a, b)                                                                         \
-  do {                                                                                                 \
-    const auto check_a = (a);                                                                          \
-    const auto check_b = (b);                                                                          \
-    if (!(check_a == static_cast<std::remove_cv_t<decltype(check_a)>>(check_b)))                                         \
-      ::warpath::detail::check_failed(__FILE__, __LINE__, #a " == " #b, check_a, check_b);             \
+#define WARPATH_CHECK_EQ(a, b)                                                             \
+  do {                                                                                     \
+    const auto check_a = (a);                                                              \
+    const auto check_b = (b);                                                              \
+    if (!(check_a == static_cast<std::remove_cv_t<decltype(check_a)>>(check_b)))           \
+      ::warpath::detail::check_failed(__FILE__, __LINE__, #a " == " #b, check_a, check_b); \
   } while (0)

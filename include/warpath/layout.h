@@ -22,7 +22,8 @@ enum class GroupKind : std::uint8_t {
 /// Numbers that are drawn together: `film`, `lens`, `time`, or one of the groups of bounce 1, 2, ...
 struct Group {
   GroupKind kind;
-  std::uint16_t bounce = 0;  ///< 0 for film, lens and time; else the vertex, counted as Mitsuba's depth: 1 is the first hit
+  std::uint16_t bounce =
+      0;  ///< 0 for film, lens and time; else the vertex, counted as Mitsuba's depth: 1 is the first hit
 
   int size() const;                       ///< how many numbers: 1 or 2
   std::uint32_t first_dimension() const;  ///< place of the first number in a path's own order, see dimension_count

@@ -12,13 +12,13 @@ namespace warpath {
 struct RealNvpSettings {
   int couplings = 8;
   int width = 64;
-  int blocks = 1;             ///< residual blocks of two dense layers in each of s and t
-  bool shared = false;        ///< s and t from one network with two heads
+  int blocks = 1;       ///< residual blocks of two dense layers in each of s and t
+  bool shared = false;  ///< s and t from one network with two heads
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
-  double rate = 1e-3;         ///< Adam's step size (at its peak, where a schedule shapes it)
+  double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)
   int batch = 2000;
-  int max_steps = 3000;       ///< training ends sooner, when the held-out likelihood no longer rises
-  double held_out = 0.05;     ///< share of the examples that is never trained on
+  int max_steps = 3000;    ///< training ends sooner, when the held-out likelihood no longer rises
+  double held_out = 0.05;  ///< share of the examples that is never trained on
 };
 /// The architecture that the authors of [ZZ19] released: 12 couplings, separate s and t, 512 wide, 8 blocks, rate 1e-4.
 RealNvpSettings released_realnvp();
@@ -26,21 +26,21 @@ RealNvpSettings released_realnvp();
 struct KdTreeSettings {
   enum class Target { mean, second_moment } target = Target::mean;  ///< density of a cell ~ mean g, or sqrt(E[g^2])
   int max_leaves = 1 << 14;
-  int min_samples = 50;       ///< candidates in a leaf
-  double shrink = 30;         ///< a cell's mean is drawn to its parent's as if by that many samples
+  int min_samples = 50;  ///< candidates in a leaf
+  double shrink = 30;    ///< a cell's mean is drawn to its parent's as if by that many samples
 };
 
 struct GridSettings {
-  int bins = 128;             ///< intervals in each dimension
+  int bins = 128;  ///< intervals in each dimension
   int iterations = 10;
-  double alpha = 0.5;         ///< VEGAS's damping
+  double alpha = 0.5;  ///< VEGAS's damping
 };
 
 struct TrainSettings {
-  std::string family = "realnvp";  ///< grid, kdtree, realnvp, uniform
+  std::string family = "realnvp";           ///< grid, kdtree, realnvp, uniform
   std::uint64_t examples = 16 * 200 * 160;  ///< |S|; epp-k is k x 200 x 160
-  double alpha = 8;                ///< |T| / |S|
-  double uniform = 0.1;            ///< share of uniform samples in the mixture; 0 hands out the bare warp
+  double alpha = 8;                         ///< |T| / |S|
+  double uniform = 0.1;                     ///< share of uniform samples in the mixture; 0 hands out the bare warp
   std::uint64_t seed = 0;
   RealNvpSettings realnvp;
   KdTreeSettings kdtree;
@@ -57,7 +57,7 @@ struct TrainLog {
   };
   std::vector<Point> points;
   double seconds = 0;
-  std::string stopped;      ///< why it ended: `held-out likelihood no longer rises`, `max_steps`, ...
+  std::string stopped;  ///< why it ended: `held-out likelihood no longer rises`, `max_steps`, ...
 };
 
 struct Fit {

@@ -26,9 +26,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string suggestion(std::string_view name, std::span<const std::string_view> known) {
-  const auto nearest = std::min_element(known.begin(), known.end(), [&](auto a, auto b) {
-    return edit_distance(name, a) < edit_distance(name, b);
-  });
+  const auto nearest = std::min_element(
+      known.begin(), known.end(), [&](auto a, auto b) { return edit_distance(name, a) < edit_distance(name, b); });
   if (nearest != known.end() && edit_distance(name, *nearest) <= std::max<std::size_t>(2, name.size() / 3))
     return fmt::format(" did you mean \"{}\"?", *nearest);
   return fmt::format(" known: {}", fmt::join(known, ", "));

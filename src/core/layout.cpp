@@ -29,9 +29,7 @@ constexpr std::string_view kKnown =
     "film, lens, time, bounceK, bounceK.light, bounceK.light_uv, bounceK.lobe, bounceK.dir, bounceK.rr (K = 1, 2, ...)";
 
 Group parse_group(std::string_view name) {
-  const auto unknown = [&] {
-    return ConfigError(fmt::format("unknown dimension \"{}\"; known: {}", name, kKnown));
-  };
+  const auto unknown = [&] { return ConfigError(fmt::format("unknown dimension \"{}\"; known: {}", name, kKnown)); };
   for (std::size_t k = 0; k < kKinds.size(); ++k)
     if (!kKinds[k].at_bounce && name == kKinds[k].name) return {static_cast<GroupKind>(k), 0};
   constexpr std::string_view prefix = "bounce";

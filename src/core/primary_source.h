@@ -27,10 +27,11 @@ struct VertexContext {
 class PrimarySource {
  public:
   virtual ~PrimarySource() = default;
-  /// Numbers of `group` for the paths `lanes` (strictly ascending indices into the batch). context is null for film, lens and
-  /// time. u0 and u1 (null for groups of one number) and inv_q get one entry per lane. Returns false if every inv_q is
-  /// 1; then inv_q is not written. The tracer multiplies the inv_q of light groups into that one light-sampling term,
-  /// and that of all others into all that follows. Roulette never sees inv_q, so that f stays a function of y.
+  /// Numbers of `group` for the paths `lanes` (strictly ascending indices into the batch). context is null for film,
+  /// lens and time. u0 and u1 (null for groups of one number) and inv_q get one entry per lane. Returns false if every
+  /// inv_q is 1; then inv_q is not written. The tracer multiplies the inv_q of light groups into that one
+  /// light-sampling term, and that of all others into all that follows. Roulette never sees inv_q, so that f stays a
+  /// function of y.
   virtual bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
                     float* u1, float* inv_q) = 0;
 };

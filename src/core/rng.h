@@ -18,7 +18,8 @@ inline std::uint64_t sample_key(std::uint64_t seed, std::uint64_t id) {
 inline std::uint64_t sample_bits(std::uint64_t key, std::uint32_t d) {
   return mix64(key + (static_cast<std::uint64_t>(d) + 1) * 0x9e3779b97f4a7c15u);
 }
-/// Uniform in [0,1): 24 and 53 random bits. Both are roundings of the same number, so a float path and a double y agree.
+/// Uniform in [0,1): 24 and 53 random bits. Both are roundings of the same number, so a float path and a double y
+/// agree.
 inline float to_unit_float(std::uint64_t bits) { return static_cast<float>(bits >> 40) * 0x1p-24f; }
 inline double to_unit_double(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
 inline float sample_float(std::uint64_t key, std::uint32_t d) { return to_unit_float(sample_bits(key, d)); }

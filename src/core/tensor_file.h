@@ -36,7 +36,8 @@ class TensorFile {
   };
   const std::map<std::string, Entry>& entries() const { return m_tensors; }
 
-  /// Throws FileError on anything that is not a whole, well-formed file (sizes are checked before anything is allocated).
+  /// Throws FileError on anything that is not a whole, well-formed file (sizes are checked before anything is
+  /// allocated).
   static TensorFile load(const std::filesystem::path& path);
   void save(const std::filesystem::path& path) const;  ///< atomically
 

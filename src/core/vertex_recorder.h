@@ -16,8 +16,8 @@ struct VertexRecords {
   std::array<const float*, kBounceDimensions> numbers{};
   const float* inv_q_light = nullptr;    ///< product over light and light_uv
   const float* inv_q_scatter = nullptr;  ///< product over lobe and dir
-  /// Luminance that the light-sampling term added, divided by the throughput (with inv_q) of the path before the vertex,
-  /// including inv_q_light.
+  /// Luminance that the light-sampling term added, divided by the throughput (with inv_q) of the path before the
+  /// vertex, including inv_q_light.
   const float* light = nullptr;
   /// Luminance that came back through the sampled direction, from all that is beyond, divided likewise, including
   /// inv_q_scatter.
