@@ -87,7 +87,10 @@ int Layout::column(Group group) const {
 
 std::string Layout::name() const {
   std::string text;
-  for (const Group group : m_groups) text += (text.empty() ? "" : "+") + group.name();
+  for (const Group group : m_groups) {
+    if (!text.empty()) text += '+';
+    text += group.name();
+  }
   return text;
 }
 
