@@ -35,6 +35,7 @@ class TensorFile {
     std::vector<std::uint8_t> bytes;
   };
   const std::map<std::string, Entry>& entries() const { return m_tensors; }
+  const std::filesystem::path& path() const { return m_path; }  ///< that it was loaded from; empty if it was not
 
   /// Throws FileError on anything that is not a whole, well-formed file (sizes are checked before anything is
   /// allocated).
