@@ -1,0 +1,23 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "core/tensor_file.h"
+#include "warpath/warp.h"
+
+namespace warpath {
+
+inline constexpr int kMaxDims = 32;  ///< of every proposal
+
+/// The proposal that Proposal::save put under `prefix`, of whatever family. Throws FileError if it is unknown or
+/// broken.
+std::shared_ptr<const Proposal> load_proposal(const TensorFile& file, const std::string& prefix);
+
+/// What every family stores: `<prefix>family` and `<prefix>dims` in the metadata.
+void save_header(TensorFile& file, const std::string& prefix, const Proposal& proposal);
+/// The stored number of dimensions; throws FileError if it is not in 1 ... kMaxDims.
+int load_dims(const TensorFile& file, const std::string& prefix);
+/// Throws FileError: the file, the proposal under `prefix`, and what is wrong with it.
+[[noreturn]] void fail_load(const TensorFile& file, const std::string& prefix, std::string_view what);
+
+}  // namespace warpath

@@ -1,0 +1,52 @@
+#include "warpath/warp_file.h"
+
+#include "core/tensor_file.h"
+#include "warp/load.h"
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+// The metadata of a file: `format`, `family`, `dims`, `layout`, `scene`, `setting.*`; the proposal's own stands under
+// `warp.`, and `family` repeats the one that was trained, for people who look into the file.
+constexpr std::string_view kFormat = "warpath 1";
+const std::string kPrefix = "warp.";
+const std::string kSetting = "setting.";
+
+}  // namespace
+
+void save_warp(const std::filesystem::path& path, const WarpFile& file) {
+  WARPATH_CHECK_EQ(file.proposal->dims(), file.layout.dims());
+  TensorFile tensors;
+  file.proposal->save(tensors, kPrefix);
+  tensors.metadata()["format"] = kFormat;
+  tensors.metadata()["family"] = file.proposal->family();
+  tensors.metadata()["dims"] = std::to_string(file.layout.dims());
+  tensors.metadata()["layout"] = file.layout.name();
+  tensors.metadata()["scene"] = file.scene;
+  for (const auto& [name, value] : file.settings) tensors.metadata()[kSetting + name] = value;
+  tensors.save(path);
+}
+
+WarpFile load_warp(const std::filesystem::path& path) {
+  const TensorFile tensors = TensorFile::load(path);
+  if (const std::string& format = tensors.meta("format"); format != kFormat)
+    throw FileError(
+        fmt::format("{}: format \"{}\"; this version of warpath reads \"{}\"", path.string(), format, kFormat));
+  WarpFile file;
+  try {
+    file.layout = Layout::parse(tensors.meta("layout"));
+  } catch (const ConfigError& error) {
+    throw FileError(fmt::format("{}: layout: {}", path.string(), error.what()));
+  }
+  file.proposal = load_proposal(tensors, kPrefix);
+  if (file.proposal->dims() != file.layout.dims())
+    throw FileError(fmt::format("{}: its warp has {} dimensions, its layout \"{}\" {}", path.string(),
+                                file.proposal->dims(), file.layout.name(), file.layout.dims()));
+  file.scene = tensors.meta("scene");
+  for (const auto& [name, value] : tensors.metadata())
+    if (name.starts_with(kSetting)) file.settings[name.substr(kSetting.size())] = value;
+  return file;
+}
+
+}  // namespace warpath
