@@ -9,16 +9,21 @@
 
 namespace warpath {
 
+/// Candidates are evaluated as samples kFirstCandidate, kFirstCandidate + 1, ...; rendering counts from 0. So one seed
+/// serves both, and no number of a candidate's path is used again by a sample.
+inline constexpr std::uint64_t kFirstCandidate = std::uint64_t{1} << 63;
+
 /// Uniform primary samples with their target values (the candidate set T of [ZZ19]). Only the target of each is kept:
 /// its y is a function of (seed, id) and is made again when it is needed, so a candidate costs 4 bytes.
 struct Candidates {
   Layout layout;
   std::uint64_t seed = 0;
-  std::vector<float> target;       ///< g >= 0 of candidate id = 0, 1, ...; non-finite ones are stored as 0
-  std::uint64_t non_finite = 0;    ///< how many were not finite
-  double seconds = 0;              ///< wall time that it took
+  std::vector<float> target;     ///< g >= 0 of candidate id = 0, 1, ...; non-finite ones are stored as 0
+  std::uint64_t non_finite = 0;  ///< how many were not finite
+  double seconds = 0;            ///< wall time that it took
   std::size_t size() const { return target.size(); }
-  /// y of candidate `id`: layout.dims() numbers.
+  /// y of candidate `id`: layout.dims() numbers, the ones that a UniformSource of this seed gives to the sample
+  /// kFirstCandidate + id.
   void primary_sample(std::uint64_t id, float* y) const;
 };
 
@@ -26,6 +31,8 @@ struct Candidates {
 struct Examples {
   Matrix<float> y;            ///< N x D
   std::vector<float> weight;  ///< N; the target g, or 1 after resampling
+  std::vector<float> inv_q;   ///< N; 1 / density that y was drawn from; empty if that was 1
+  std::size_t size() const { return y.rows(); }
 };
 
 }  // namespace warpath
