@@ -7,8 +7,8 @@
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
 #include "train/train.h"
-#include "warp/warp_file.h"
 #include "warpath/error.h"
+#include "warpath/warp_file.h"
 
 namespace warpath {
 namespace {
@@ -53,7 +53,9 @@ std::shared_ptr<const Candidates> MethodTrainer::candidates(const Layout& layout
   const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
   StageProgress progress(fmt::format("candidates for {}", layout.name()), m_quiet);
   const PathIntegrand integrand(m_tracer, layout, seed);
-  known = std::make_shared<Candidates>(gather_candidates(integrand, layout, seed, count, progress.callback()));
+  known = std::make_shared<Candidates>(gather_candidates(integrand, layout, seed, count, [&](std::uint64_t done) {
+    progress.update(static_cast<double>(done) / static_cast<double>(count));
+  }));
   return known;
 }
 

@@ -91,7 +91,7 @@ ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_
 }
 
 void ImageEstimator::add_pass(int spp, const Progress& progress, const std::function<bool()>& stop) {
-  add_emission(kEmissionRays * spp, stop);
+  add_emission_pass(spp, stop);
   add_paths(spp, progress, stop);
 }
 
@@ -187,8 +187,9 @@ void ImageEstimator::add_paths(int spp, const Progress& progress, const std::fun
   m_cost.trace_seconds += wall * trace_seconds / thread_time;
 }
 
-void ImageEstimator::add_emission(int rays, const std::function<bool()>& stop) {
+void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& stop) {
   if (!m_emission) return;
+  const int rays = kEmissionRays * spp;
   const FilmSettings& film = m_tracer.scene().film;
   const auto start = Clock::now();
   // A jittered grid inside each pixel, of at least `rays` cells.
@@ -229,6 +230,13 @@ void ImageEstimator::add_emission(int rays, const std::function<bool()>& stop) {
 }
 
 ImageEstimate ImageEstimator::develop_rest() const { return m_film.develop(); }
+
+ImageEstimate ImageEstimator::develop_emission() const {
+  if (m_emission) return m_emission->develop();
+  const std::vector<Color> black(m_pixels.size(), Color(0.0f));
+  const FilmSettings& film = m_tracer.scene().film;
+  return {film.crop_width, film.crop_height, black, black, std::vector<float>(m_pixels.size())};
+}
 
 ImageEstimate ImageEstimator::develop() const {
   ImageEstimate image = m_film.develop();

@@ -38,15 +38,18 @@ class ImageEstimator {
   /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
-  ImageEstimate develop() const;       ///< the whole image
-  ImageEstimate develop_rest() const;  ///< without directly seen emission
-  double spp() const;                  ///< samples per pixel so far
+  /// Adds 4 x `spp` camera rays to each pixel that may see an emitter, and no path.
+  void add_emission_pass(int spp, const std::function<bool()>& stop = {});
+
+  ImageEstimate develop() const;           ///< the whole image
+  ImageEstimate develop_rest() const;      ///< without directly seen emission
+  ImageEstimate develop_emission() const;  ///< directly seen emission alone
+  double spp() const;                      ///< samples per pixel so far
   std::uint64_t non_finite() const;
   const RenderCost& cost() const { return m_cost; }
 
  private:
   void add_paths(int spp, const Progress& progress, const std::function<bool()>& stop);
-  void add_emission(int rays, const std::function<bool()>& stop);
 
   const Tracer& m_tracer;
   Layout m_layout;

@@ -1,0 +1,206 @@
+#include "cli/comparison.h"
+
+#include <fmt/chrono.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "cli/terminal.h"
+#include "core/interrupt.h"
+#include "core/log.h"
+#include "core/rng.h"
+#include "report/summary.h"
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+/// The reference must not share a random number with what it judges.
+constexpr std::uint64_t kReferenceStream = 0x7265666572000004u;
+/// A reference needs this many times the samples, so that its own noise, which is subtracted, stays small.
+constexpr int kReferenceFactor = 8;
+
+std::string cpu_name() {
+  std::ifstream stream("/proc/cpuinfo");
+  for (std::string line; std::getline(stream, line);)
+    if (line.starts_with("model name")) return line.substr(std::min(line.find(':') + 2, line.size()));
+  return "unknown";
+}
+
+/// A file name from what was typed as a method.
+std::string file_name(std::string method) {
+  for (char& c : method)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '+' && c != '.' && c != '-') c = '_';
+  return method;
+}
+
+Reference as_reference(const ImageEstimate& estimate) {
+  Reference reference;
+  reference.image = image_rgb(estimate);
+  reference.variance = ImageRgb(estimate.width, estimate.height);
+  reference.variance->pixels = estimate.variance;
+  return reference;
+}
+
+}  // namespace
+
+ComparisonRunner::ComparisonRunner(const Tracer& tracer, Settings settings)
+    : m_tracer(tracer), m_settings(std::move(settings)) {}
+
+void ComparisonRunner::run(int threads) {
+  const Scene& scene = m_tracer.scene();
+  Comparison& c = m_comparison;
+  c.scene = m_settings.scene_name;
+  c.version = WARPATH_VERSION;
+  c.commit = WARPATH_COMMIT;
+  c.cpu = cpu_name();
+  c.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  c.command = m_settings.command;
+  c.width = scene.film.crop_width;
+  c.height = scene.film.crop_height;
+  c.threads = threads;
+  c.seed = m_settings.common.seed;
+  c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
+
+  prepare_reference();
+  c.reference = m_reference.path.string();
+  c.reference_has_variance = m_reference.variance.has_value();
+
+  for (int run = 0; run < m_settings.runs && !g_interrupted; ++run)
+    for (const Method& method : m_settings.methods) {
+      if (g_interrupted) break;
+      try {
+        c.results.push_back(run_method(method, run));
+      } catch (const Interrupted&) {
+        break;
+      }
+      // In the order of the methods, all runs of one together.
+      const auto place = [&](const MethodRun& r) {
+        return std::find_if(m_settings.methods.begin(), m_settings.methods.end(),
+                            [&](const Method& m) { return m.name == r.method; });
+      };
+      std::stable_sort(c.results.begin(), c.results.end(),
+                       [&](const MethodRun& a, const MethodRun& b) { return place(a) < place(b); });
+      write_results(m_settings.directory / "results.json", c);
+    }
+  if (c.results.empty()) throw Interrupted{};
+}
+
+void ComparisonRunner::prepare_reference() {
+  const FilmSettings& film = m_tracer.scene().film;
+  const std::uint64_t seed = mix64(m_settings.common.seed ^ kReferenceStream);
+  ImageEstimator estimator(m_tracer, {}, nullptr, seed);
+  if (m_settings.reference.empty()) {
+    const int spp = m_settings.reference_spp > 0
+                        ? m_settings.reference_spp
+                        : kReferenceFactor * m_settings.render.spp.value_or(m_tracer.scene().sample_count);
+    StageProgress progress(fmt::format("reference, {} spp", spp), m_settings.common.quiet);
+    estimator.add_pass(spp, progress.callback());
+    if (g_interrupted) throw Interrupted{};
+    const ImageEstimate image = estimator.develop();
+    m_reference = as_reference(image);
+    m_reference.path = m_settings.directory / "reference.exr";
+    m_reference_rest = as_reference(estimator.develop_rest());
+    write_image(m_reference.path, image_file(image));
+    return;
+  }
+  m_reference = read_reference(m_settings.reference, film.crop_width, film.crop_height);
+  // What is left of the given reference without what the camera sees emitted directly.
+  constexpr int kEmissionSpp = 256;
+  estimator.add_emission_pass(kEmissionSpp);
+  const ImageEstimate emission = estimator.develop_emission();
+  m_reference_rest = m_reference;
+  for (std::size_t p = 0; p < emission.mean.size(); ++p) {
+    m_reference_rest.image.pixels[p] -= emission.mean[p];
+    if (m_reference_rest.variance) m_reference_rest.variance->pixels[p] += emission.variance[p];
+  }
+}
+
+MethodRun ComparisonRunner::run_method(const Method& method, int run) {
+  const std::uint64_t seed = m_settings.common.seed + static_cast<std::uint64_t>(run);
+  const auto clock = start_clock();
+  const Budget budget = make_budget(m_settings.render, m_tracer.scene().sample_count);
+  // Candidates are shared by the methods of a run: what they cost counts for each of them.
+  auto& trainer = m_trainers[run];
+  if (!trainer)
+    trainer = std::make_unique<MethodTrainer>(m_tracer, m_settings.training.train_settings(seed),
+                                              m_settings.training.init, m_settings.common.quiet);
+  const PreparedMethod prepared = trainer->prepare(method);
+  const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
+
+  MethodRun result;
+  result.method = method.name;
+  result.family = method.family;
+  result.dims = method.layout.name();
+  result.size = fmt::format("{}x{}", m_comparison.width, m_comparison.height);
+  result.seed = seed;
+  result.candidate_seconds = prepared.candidate_seconds;
+  result.train_seconds = prepared.log.seconds;
+  result.training_stopped = prepared.log.stopped;
+  for (const auto& p : prepared.log.points) result.training_curve.push_back({p.seconds, p.samples, p.loss, p.held_out});
+  if (prepared.candidates) {
+    const auto& target = prepared.candidates->target;
+    result.candidates = result.train_samples = target.size();
+    result.candidates_nonzero =
+        static_cast<double>(std::count_if(target.begin(), target.end(), [](float g) { return g > 0; })) /
+        static_cast<double>(target.size());
+  }
+
+  ImageEstimator estimator(m_tracer, method.layout, prepared.proposal, seed);
+  {
+    StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_settings.runs),
+                           m_settings.common.quiet);
+    render_passes(estimator, budget, progress.callback(), [&] {
+      const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
+      result.error_curve.push_back(
+          {estimator.spp(), prepare_seconds + estimator.cost().total(), errors.mse, errors.relmse});
+    });
+  }
+  if (estimator.cost().samples == 0) throw Interrupted{};
+
+  const RenderCost& cost = estimator.cost();
+  result.spp = estimator.spp();
+  result.samples = cost.samples;
+  result.warp_seconds = cost.warp_seconds;
+  result.trace_seconds = cost.trace_seconds + cost.emission_seconds;
+  result.total_seconds = prepare_seconds + cost.total();
+  result.non_finite = estimator.non_finite();
+  const ImageEstimate image = estimator.develop();
+  const ImageRgb rest = image_rgb(estimator.develop_rest());
+  result.set_errors(image_errors(image_rgb(image), m_reference));
+  const ImageErrors rest_errors = image_errors(rest, m_reference_rest);
+  result.mse_rest = rest_errors.mse;
+  result.relmse_rest = rest_errors.relmse;
+  result.mean = image_mean(image_rgb(image));
+  result.mean_rest = image_mean(rest);
+  log::debug("{}: {:.1f} s in all", method.name, clock());
+
+  if (run == 0) {
+    m_images.push_back(image_rgb(image));
+    ImageFile file = image_file(image);
+    describe(file, m_tracer, method, m_settings.common, estimator, result.total_seconds);
+    write_image(m_settings.directory / (file_name(method.name) + ".exr"), file);
+    keep_densities(method, prepared);
+  }
+  return result;
+}
+
+void ComparisonRunner::keep_densities(const Method& method, const PreparedMethod& prepared) {
+  if (!prepared.candidates || !prepared.proposal) return;
+  constexpr int kBins = 64;
+  constexpr std::uint64_t kSamples = 1 << 20;
+  // One picture for each group of two numbers, and for each single number beside the next.
+  const auto groups = method.layout.groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const int x = method.layout.column(groups[g]);
+    const bool pair = groups[g].size() == 2;
+    if (!pair && x + 1 >= method.layout.dims()) continue;
+    const std::string name = groups[g].name();
+    m_densities.push_back({method.name, pair ? name + "[0]" : name,
+                           pair ? name + "[1]" : groups[g + 1].name() + (groups[g + 1].size() == 2 ? "[0]" : ""),
+                           target_marginal(*prepared.candidates, x, x + 1, kBins),
+                           proposal_marginal(*prepared.proposal, x, x + 1, kBins, kSamples)});
+  }
+}
+
+}  // namespace warpath
