@@ -79,10 +79,14 @@ struct BumpMap {
   BsdfId nested;
   TextureId displacement;
   float scale = 1;
+  bool flip_invalid_normals = true;    ///< turn normals that face away from the ray
+  bool use_shadowing_function = true;  ///< smooth shadow terminator
 };
 struct NormalMap {
   BsdfId nested;
   TextureId normalmap;  ///< raw RGB, n = 2 rgb - 1
+  bool flip_invalid_normals = true;
+  bool use_shadowing_function = true;
 };
 struct Null {};
 

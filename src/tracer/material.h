@@ -16,6 +16,9 @@ struct SurfacePoint {
   Vec2 uv;
   Vec3 dp_du, dp_dv;  ///< only where Materials::needs_tangents(bsdf), else undefined
   Vec3 dn_du, dn_dv;  ///< change of the shading normal with uv, likewise
+  /// A mesh whose texture coordinates run the other way round: dp_du x dp_dv points away from ng. Never set for
+  /// analytic shapes, whose tangent frame is (dp_du, ns x dp_du, ns) in Mitsuba.
+  bool left_handed = false;
 };
 
 struct BsdfSample {
@@ -28,12 +31,13 @@ struct BsdfSample {
 };
 
 /// One BSDF at one point: nested BSDFs resolved, textures looked up, frame built. Plain data; lives for one bounce.
-struct Scatter;
+struct Scatter;  // in scatter.h
 
 /// The scene's BSDFs, compiled for rendering. Immutable, thread-safe.
 class Materials {
  public:
-  explicit Materials(const Scene& scene);  ///< keeps references to the scene's textures
+  /// Compiles the scene's BSDFs and shares its images. Throws SceneError where a BSDF nests more than Scatter holds.
+  explicit Materials(const Scene& scene);
   ~Materials();
   /// True where the frame or the BSDF depends on the direction of u: anisotropic, bump- or normal-mapped.
   bool needs_tangents(BsdfId bsdf) const;

@@ -1,0 +1,206 @@
+#include "tracer/fresnel.h"
+#include "tracer/lobe.h"
+#include "tracer/microfacet.h"
+
+namespace warpath {
+
+// Mitsuba 3's `principled`. [Burley 2012, Physically Based Shading at Disney; Burley 2015, Extending the Disney BRDF]
+
+namespace {
+
+float mix(float a, float b, float t) { return a + (b - a) * t; }
+Color mix(const Color& a, const Color& b, float t) { return a + (b - a) * t; }
+
+/// (1 - cos)^5
+float schlick_weight(float cosine) {
+  const float m = clamp01(1 - cosine);
+  return sqr(sqr(m)) * m;
+}
+
+/// Weight of white in Schlick's approximation; from within, by the angle outside.
+float schlick_white(float cos_theta_i, float eta) {
+  const bool outside = cos_theta_i >= 0;
+  const float eta_it = outside ? eta : 1 / eta;
+  if (eta_it > 1) return schlick_weight(std::fabs(cos_theta_i));
+  return schlick_weight(std::sqrt(std::fmax(0.0f, 1 - (1 - sqr(cos_theta_i)) / sqr(eta_it))));
+}
+
+/// Base colour without its luminance.
+Color tint(const Color& base_color) {
+  const float l = luminance(base_color);
+  return l > 0 ? base_color * (1 / l) : Color(1.0f);
+}
+
+/// Clear coat's distribution of normals, GTR1; its shadowing is GGX's with roughness 0.25.
+struct ClearCoat {
+  float alpha2;
+  explicit ClearCoat(float gloss) : alpha2(sqr(mix(0.1f, 0.001f, gloss))) {}
+  float eval(const Vec3& h) const {
+    const float d = (alpha2 - 1) / (kPi * std::log(alpha2) * (1 + (alpha2 - 1) * h.z * h.z));
+    return d * h.z > 1e-20f ? d : 0;
+  }
+  float pdf(const Vec3& h) const { return h.z < 0 ? 0 : h.z * eval(h); }
+  Vec3 sample(const Vec2& u) const {
+    const float phi = 2 * kPi * u.x;
+    const float cos2 = (1 - std::pow(alpha2, 1 - u.y)) / (1 - alpha2);
+    const float sin_theta = std::sqrt(std::fmax(0.0f, 1 - cos2));
+    return {std::cos(phi) * sin_theta, std::sin(phi) * sin_theta, std::sqrt(std::fmax(0.0f, cos2))};
+  }
+  static float smith_g1(const Vec3& v, const Vec3& h) {
+    if (!(v.dot(h) * v.z > 0)) return 0;
+    const float cos2 = v.z * v.z;
+    const float tan2 = std::fmax(0.0f, 1 - cos2) / cos2;
+    return 2 / (1 + std::sqrt(1 + 0.0625f * tan2));
+  }
+};
+
+/// What sampling and evaluation share at a point.
+struct Setup {
+  bool front;
+  float brdf, bsdf;  ///< shares of the diffuse base and of the transmitting one
+  Microfacet distribution;
+  /// Probabilities of the lobes, but for the split of the main specular one by its Fresnel term.
+  float diffuse = 0, clearcoat = 0, specular = 0;
+
+  Setup(const LobeModel& m, const PrincipledValues& v, const Vec3& wi)
+      : front(wi.z > 0),
+        brdf((1 - v.metallic) * (1 - v.spec_trans)),
+        bsdf((1 - v.metallic) * v.spec_trans),
+        distribution(make_distribution(m, v)) {
+    if (front) {
+      diffuse = brdf * m.diffuse_rate;
+      clearcoat = 0.25f * v.clearcoat * m.clearcoat_rate;
+      specular = m.specular_rate;
+    } else if (bsdf > 0) {
+      specular = 1;  // within, only the main specular lobe scatters
+    }
+    const float total = diffuse + clearcoat + specular;
+    const float scale = total > 0 ? 1 / total : 0;
+    diffuse *= scale;
+    clearcoat *= scale;
+    specular *= scale;
+  }
+  /// Share of the main specular lobe that is refracted, at a microfacet with this Fresnel reflectance.
+  float refracted(float fresnel) const { return (front ? bsdf : 1) * (1 - fresnel); }
+
+  static Microfacet make_distribution(const LobeModel& m, const PrincipledValues& v) {
+    const float alpha = sqr(v.roughness);
+    const float aspect = m.has_anisotropic ? std::sqrt(1 - 0.9f * v.anisotropic) : 1;
+    return {MicrofacetType::ggx, std::fmax(0.001f, alpha / aspect), std::fmax(0.001f, alpha * aspect), true};
+  }
+};
+
+/// Fresnel term of the main specular reflection: dielectric, tinted dielectric, and metal.
+Color specular_fresnel(const LobeModel& m, const PrincipledValues& v, const Setup& setup, float fresnel, float cos_h) {
+  if (!setup.front) return Color(setup.bsdf * fresnel);
+  Color f((1 - v.metallic) * (1 - v.spec_tint) * fresnel);
+  if (!m.has_metallic && !m.has_spec_tint) return f;
+  const float white = schlick_white(cos_h, m.eta);
+  if (m.has_metallic) f += mix(v.base_color, Color(1.0f), white) * v.metallic;
+  if (m.has_spec_tint) {
+    const float eta_it = cos_h >= 0 ? m.eta : 1 / m.eta;
+    const float r0 = sqr((eta_it - 1) / (eta_it + 1));
+    f += mix(tint(v.base_color) * r0, Color(1.0f), white) * ((1 - v.metallic) * v.spec_tint);
+  }
+  return f;
+}
+
+/// The diffuse base with retro-reflection, flatness and sheen, times |cos theta_o|.
+Color eval_base(const LobeModel& m, const PrincipledValues& v, const Setup& setup, const Vec3& wi, const Vec3& wo,
+                float cos_d) {
+  const float f_i = schlick_weight(wi.z), f_o = schlick_weight(wo.z);
+  const float rr = 2 * v.roughness * cos_d * cos_d;
+  float f = (1 - 0.5f * f_i) * (1 - 0.5f * f_o) + rr * (f_o + f_i + f_o * f_i * (rr - 1));
+  if (m.has_flatness) {
+    const float fss = mix(1, 0.5f * rr, f_o) * mix(1, 0.5f * rr, f_i);
+    f = mix(f, 1.25f * (fss * (1 / (wo.z + wi.z) - 0.5f) + 0.5f), v.flatness);
+  }
+  Color value = v.base_color * (setup.brdf * f * cosine_hemisphere_pdf(wo.z));
+  // As in Mitsuba, there is sheen only where the diffuse base is.
+  if (m.has_sheen && setup.brdf > 0) {
+    const Color color = m.has_sheen_tint ? mix(Color(1.0f), tint(v.base_color), v.sheen_tint) : Color(1.0f);
+    value += color * (v.sheen * (1 - v.metallic) * schlick_weight(std::fabs(cos_d)) * wo.z);
+  }
+  return value;
+}
+
+}  // namespace
+
+LobeEval eval_principled(const LobeModel& m, const PrincipledValues& v, const Vec3& wi, const Vec3& wo) {
+  LobeEval e;
+  if (wi.z == 0 || wo.z == 0) return e;
+  const Setup setup(m, v, wi);
+  const bool reflect = wi.z * wo.z > 0;
+  if (!setup.front && !(setup.bsdf > 0)) return e;
+  const float eta = setup.front ? m.eta : 1 / m.eta;  // far side over the side of wi
+  Vec3 h = wi + wo * (reflect ? 1.0f : eta);
+  const float length2 = h.dot(h);
+  if (!(length2 > 0)) return e;
+  h *= (h.z < 0 ? -1.0f : 1.0f) / std::sqrt(length2);
+  const float wi_h = wi.dot(h), wo_h = wo.dot(h);
+  const bool facing = wi_h * wi.z > 0 && wo_h * wo.z > 0;  // facet and surface agree on the sides
+
+  if (facing) {
+    const float fresnel = fresnel_dielectric(wi_h, m.eta).reflectance;
+    const float g1_wi = setup.distribution.smith_g1(wi, h);
+    const float visible = setup.distribution.eval(h) * g1_wi / std::fabs(wi.z);  // pdf of h over |wi.h|
+    const float g1_wo = setup.distribution.smith_g1(wo, h);
+    const float refracted = setup.refracted(fresnel);
+    if (reflect) {
+      // As in Mitsuba, an index of 1 reflects nothing, metal or not.
+      if (fresnel > 0) e.value = specular_fresnel(m, v, setup, fresnel, wi_h) * (visible * g1_wo * 0.25f);
+      e.pdf = setup.specular * (1 - refracted) * visible * 0.25f;
+      if (m.has_clearcoat && setup.front && v.clearcoat > 0) {
+        const ClearCoat coat(v.clearcoat_gloss);
+        const float f = mix(0.04f, 1, schlick_white(wi_h, m.eta));
+        const float g = ClearCoat::smith_g1(wi, h) * ClearCoat::smith_g1(wo, h);
+        e.value += Color(v.clearcoat * 0.25f * f * coat.eval(h) * g * wo.z);
+        e.pdf += setup.clearcoat * coat.pdf(h) / (4 * wo_h);
+      }
+    } else if (setup.bsdf > 0) {
+      const float denominator = sqr(wi_h + eta * wo_h);
+      if (denominator > 0) {
+        const Color root(std::sqrt(std::fmax(0.0f, v.base_color.x)), std::sqrt(std::fmax(0.0f, v.base_color.y)),
+                         std::sqrt(std::fmax(0.0f, v.base_color.z)));
+        const float jacobian = std::fabs(wo_h * wi_h) / denominator;
+        e.value = root * (setup.bsdf * (1 - fresnel) * visible * g1_wo * jacobian);
+        e.pdf = setup.specular * refracted * visible * jacobian * eta * eta;
+      }
+    }
+  }
+  if (reflect && setup.front) {
+    if (setup.brdf > 0) e.value += eval_base(m, v, setup, wi, wo, wo_h);
+    e.pdf += setup.diffuse * cosine_hemisphere_pdf(wo.z);
+  }
+  return e;
+}
+
+LobeSample sample_principled(const LobeModel& m, const PrincipledValues& v, const Vec3& wi, float u, const Vec2& dir) {
+  LobeSample s;
+  if (wi.z == 0) return s;
+  const Setup setup(m, v, wi);
+  if (!setup.front && !(setup.bsdf > 0)) return s;
+  if (u < setup.diffuse) {
+    s.wo = square_to_cosine_hemisphere(dir);
+  } else if (u < setup.diffuse + setup.clearcoat) {
+    s.wo = reflect_about(wi, ClearCoat(v.clearcoat_gloss).sample(dir));
+    if (!(s.wo.z > 0)) return s;
+  } else {
+    const Vec3 h = setup.distribution.sample(setup.front ? wi : -wi, dir);
+    const FresnelDielectric f = fresnel_dielectric(wi.dot(h), m.eta);
+    if (u < setup.diffuse + setup.clearcoat + setup.specular * setup.refracted(f.reflectance)) {
+      s.wo = refract_about(wi, h, f).normalized();
+      if (!(s.wo.z * wi.z < 0)) return s;
+      s.eta = f.eta_it;
+    } else {
+      s.wo = reflect_about(wi, h);
+      if (!(s.wo.z * wi.z > 0)) return s;
+    }
+  }
+  const LobeEval e = eval_principled(m, v, wi, s.wo);
+  s.pdf = e.pdf;
+  if (e.pdf > 0) s.weight = e.value * (1 / e.pdf);
+  return s;
+}
+
+}  // namespace warpath

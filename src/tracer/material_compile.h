@@ -1,0 +1,38 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "scene/scene.h"
+#include "tracer/lobe.h"
+#include "tracer/texture_lookup.h"
+
+namespace warpath {
+
+/// A BSDF of the scene, ready to be resolved at a point. A lobe, or a node that nests others.
+struct MaterialNode {
+  enum class Type : std::uint8_t { lobe, two_sided, mask, blend, bump_map, normal_map };
+  Type type = Type::lobe;
+  bool flip_invalid_normals = true, shadowed = true;  ///< maps
+  bool needs_tangents = false, needs_uv = false;      ///< of all below
+  bool anisotropic = false;                           ///< a lobe below, maps or not, follows the tangent
+  bool tangent_frame = false;                         ///< a lobe below, not under a map, follows the tangent
+  bool turns_to_wi = false;                           ///< every lobe below, not under a map, is twosided or null
+  std::uint16_t model = 0;                            ///< lobe: index into CompiledMaterials::models
+  std::int32_t children[2]{-1, -1};
+  TextureId texture = -1;              ///< opacity, weight, displacement or normalmap
+  float scale = 1;                     ///< bump_map
+  std::array<TextureId, 11> values{};  ///< lobe: textures in the order of its values
+  // What the worst path through it needs of a Scatter.
+  int lobes = 1, value_count = 0, perturbed = 0;
+};
+
+struct CompiledMaterials {
+  TextureLookup textures;
+  std::vector<LobeModel> models;    ///< [0] is the null lobe
+  std::vector<MaterialNode> nodes;  ///< one per BSDF of the scene, same index
+};
+
+/// Throws SceneError if a BSDF nests itself or more than a Scatter can hold.
+CompiledMaterials compile_materials(const Scene& scene);
+
+}  // namespace warpath

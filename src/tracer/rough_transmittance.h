@@ -1,0 +1,35 @@
+#pragma once
+#include <array>
+#include <memory>
+
+#include "scene/bsdf.h"
+
+namespace warpath {
+
+/// How much light passes a rough dielectric surface from outside, by the cosine of its direction; 64 nodes, linear
+/// between them, as Mitsuba's roughplastic has it. Empty until assigned from make_rough_transmittance.
+class RoughTransmittance {
+ public:
+  static constexpr int kNodes = 64;
+  using Table = std::array<float, kNodes>;
+  RoughTransmittance() = default;
+  explicit RoughTransmittance(std::shared_ptr<const Table> table) : m_table(std::move(table)) {}
+  float operator()(float cos_theta) const {
+    const float x = cos_theta * (kNodes - 1);
+    const int i = x < kNodes - 2 ? static_cast<int>(x) : kNodes - 2;
+    const float t = x - static_cast<float>(i);
+    return (*m_table)[i] * (1 - t) + (*m_table)[i + 1] * t;
+  }
+
+ private:
+  std::shared_ptr<const Table> m_table;
+};
+
+struct RoughInterface {
+  RoughTransmittance external_transmittance;
+  float internal_reflectance;  ///< of diffuse light from within
+};
+/// Integrates the interface's rough reflection and refraction; takes some milliseconds. eta > 0, not 1.
+RoughInterface make_rough_interface(MicrofacetType distribution, float alpha, float eta);
+
+}  // namespace warpath
