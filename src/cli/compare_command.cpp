@@ -3,7 +3,6 @@
 
 #include "cli/commands.h"
 #include "cli/comparison.h"
-#include "cli/comparison_report.h"
 #include "cli/terminal.h"
 #include "core/log.h"
 #include "report/summary.h"
@@ -20,11 +19,11 @@ struct CompareCommand {
     const Threads threads(settings.common);
     for (const std::string& text : methods) settings.methods.push_back(parse_method(text));
     settings.scene_name = settings.common.scene.string();
-    const Tracer tracer(load_scene(settings.common, &settings.render));
+    const auto tracer = std::make_shared<Tracer>(load_scene(settings.common, &settings.render));
     ComparisonRunner runner(tracer, settings);
     runner.run(threads.count());
-    write_report(settings.directory / "index.html", runner);
-    fmt::print("{}", results_table(runner.comparison()));
+    write_report(settings.directory, runner.data());
+    fmt::print("{}", results_table(runner.data().comparison));
     log::info("report: {}", (settings.directory / "index.html").string());
   }
 };

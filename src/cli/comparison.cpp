@@ -9,7 +9,7 @@
 #include "core/interrupt.h"
 #include "core/log.h"
 #include "core/rng.h"
-#include "report/summary.h"
+#include "train/marginals.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -34,6 +34,21 @@ std::string file_name(std::string method) {
   return method;
 }
 
+/// Name of each column of y: `film.x`, `bounce1.dir.u`, `bounce1.lobe`.
+std::vector<std::string> column_names(const Layout& layout) {
+  std::vector<std::string> names;
+  for (const Group group : layout.groups()) {
+    const bool film = group.kind == GroupKind::film;
+    if (group.size() == 1) {
+      names.push_back(group.name());
+    } else {
+      names.push_back(group.name() + (film ? ".x" : ".u"));
+      names.push_back(group.name() + (film ? ".y" : ".v"));
+    }
+  }
+  return names;
+}
+
 Reference as_reference(const ImageEstimate& estimate) {
   Reference reference;
   reference.image = image_rgb(estimate);
@@ -44,12 +59,12 @@ Reference as_reference(const ImageEstimate& estimate) {
 
 }  // namespace
 
-ComparisonRunner::ComparisonRunner(const Tracer& tracer, Settings settings)
-    : m_tracer(tracer), m_settings(std::move(settings)) {}
+ComparisonRunner::ComparisonRunner(std::shared_ptr<const Tracer> tracer, Settings settings)
+    : m_tracer(std::move(tracer)), m_settings(std::move(settings)) {}
 
 void ComparisonRunner::run(int threads) {
-  const Scene& scene = m_tracer.scene();
-  Comparison& c = m_comparison;
+  const Scene& scene = m_tracer->scene();
+  Comparison& c = m_data.comparison;
   c.scene = m_settings.scene_name;
   c.version = WARPATH_VERSION;
   c.commit = WARPATH_COMMIT;
@@ -63,6 +78,7 @@ void ComparisonRunner::run(int threads) {
   c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
 
   prepare_reference();
+  m_data.reference = m_reference.image;
   c.reference = m_reference.path.string();
   c.reference_has_variance = m_reference.variance.has_value();
 
@@ -87,13 +103,13 @@ void ComparisonRunner::run(int threads) {
 }
 
 void ComparisonRunner::prepare_reference() {
-  const FilmSettings& film = m_tracer.scene().film;
+  const FilmSettings& film = m_tracer->scene().film;
   const std::uint64_t seed = mix64(m_settings.common.seed ^ kReferenceStream);
-  ImageEstimator estimator(m_tracer, {}, nullptr, seed);
+  ImageEstimator estimator(*m_tracer, {}, nullptr, seed);
   if (m_settings.reference.empty()) {
     const int spp = m_settings.reference_spp > 0
                         ? m_settings.reference_spp
-                        : kReferenceFactor * m_settings.render.spp.value_or(m_tracer.scene().sample_count);
+                        : kReferenceFactor * m_settings.render.spp.value_or(m_tracer->scene().sample_count);
     StageProgress progress(fmt::format("reference, {} spp", spp), m_settings.common.quiet);
     estimator.add_pass(spp, progress.callback());
     if (g_interrupted) throw Interrupted{};
@@ -119,7 +135,7 @@ void ComparisonRunner::prepare_reference() {
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const std::uint64_t seed = m_settings.common.seed + static_cast<std::uint64_t>(run);
   const auto clock = start_clock();
-  const Budget budget = make_budget(m_settings.render, m_tracer.scene().sample_count);
+  const Budget budget = make_budget(m_settings.render, m_tracer->scene().sample_count);
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)
@@ -132,7 +148,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   result.method = method.name;
   result.family = method.family;
   result.dims = method.layout.name();
-  result.size = fmt::format("{}x{}", m_comparison.width, m_comparison.height);
+  result.size = fmt::format("{}x{}", m_data.comparison.width, m_data.comparison.height);
   result.seed = seed;
   result.candidate_seconds = prepared.candidate_seconds;
   result.train_seconds = prepared.log.seconds;
@@ -146,7 +162,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
         static_cast<double>(target.size());
   }
 
-  ImageEstimator estimator(m_tracer, method.layout, prepared.proposal, seed);
+  ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed);
   {
     StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_settings.runs),
                            m_settings.common.quiet);
@@ -176,9 +192,9 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   log::debug("{}: {:.1f} s in all", method.name, clock());
 
   if (run == 0) {
-    m_images.push_back(image_rgb(image));
+    m_data.images.push_back({method.name, image_rgb(image)});
     ImageFile file = image_file(image);
-    describe(file, m_tracer, method, m_settings.common, estimator, result.total_seconds);
+    describe(file, *m_tracer, method, m_settings.common, estimator, result.total_seconds);
     write_image(m_settings.directory / (file_name(method.name) + ".exr"), file);
     keep_densities(method, prepared);
   }
@@ -189,17 +205,15 @@ void ComparisonRunner::keep_densities(const Method& method, const PreparedMethod
   if (!prepared.candidates || !prepared.proposal) return;
   constexpr int kBins = 64;
   constexpr std::uint64_t kSamples = 1 << 20;
-  // One picture for each group of two numbers, and for each single number beside the next.
-  const auto groups = method.layout.groups();
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const int x = method.layout.column(groups[g]);
-    const bool pair = groups[g].size() == 2;
-    if (!pair && x + 1 >= method.layout.dims()) continue;
-    const std::string name = groups[g].name();
-    m_densities.push_back({method.name, pair ? name + "[0]" : name,
-                           pair ? name + "[1]" : groups[g + 1].name() + (groups[g + 1].size() == 2 ? "[0]" : ""),
-                           target_marginal(*prepared.candidates, x, x + 1, kBins),
-                           proposal_marginal(*prepared.proposal, x, x + 1, kBins, kSamples)});
+  // Neighbouring columns in pairs: both numbers of a group where it has two, else it and the next group's first.
+  const std::vector<std::string> names = column_names(method.layout);
+  const auto grid = [](Marginal marginal) { return DensityGrid{kBins, kBins, std::move(marginal.density)}; };
+  for (const Group group : method.layout.groups()) {
+    const int x = method.layout.column(group), y = x + 1;
+    if (y >= method.layout.dims()) continue;
+    m_data.densities.push_back({method.name, names[static_cast<std::size_t>(x)], names[static_cast<std::size_t>(y)], "",
+                                grid(proposal_marginal(*prepared.proposal, x, y, kBins, kSamples)),
+                                grid(target_marginal(*prepared.candidates, x, y, kBins))});
   }
 }
 

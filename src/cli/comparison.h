@@ -1,16 +1,14 @@
 #pragma once
 #include <filesystem>
 #include <map>
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "cli/method.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "report/image.h"
-#include "report/results.h"
-#include "train/marginals.h"
+#include "report/html.h"
 
 namespace warpath {
 
@@ -29,35 +27,23 @@ class ComparisonRunner {
     std::string command;              ///< as typed
     std::string scene_name;
   };
-  ComparisonRunner(const Tracer& tracer, Settings settings);
+  ComparisonRunner(std::shared_ptr<const Tracer> tracer, Settings settings);
   /// Runs everything, run by run and method by method; results.json is written anew after each, so that the last
   /// complete one survives whatever happens. Ends early on Ctrl-C, with what there is.
   void run(int threads);
 
-  const Comparison& comparison() const { return m_comparison; }
-  /// First run's image of each method, in the order of the methods; fewer if it ended early.
-  const std::vector<ImageRgb>& images() const { return m_images; }
-  const Reference& reference() const { return m_reference; }
-
-  /// Where a method's samples went over two dimensions, beside where they should go.
-  struct DensityPicture {
-    std::string method, dimensions_x, dimensions_y;
-    Marginal target, learned;
-  };
-  const std::vector<DensityPicture>& densities() const { return m_densities; }
+  const ReportData& data() const { return m_data; }
 
  private:
   void prepare_reference();
   MethodRun run_method(const Method& method, int run);
   void keep_densities(const Method& method, const PreparedMethod& prepared);
 
-  const Tracer& m_tracer;
+  std::shared_ptr<const Tracer> m_tracer;
   Settings m_settings;
   Reference m_reference, m_reference_rest;
   std::map<int, std::unique_ptr<MethodTrainer>> m_trainers;  // by run
-  Comparison m_comparison;
-  std::vector<ImageRgb> m_images;
-  std::vector<DensityPicture> m_densities;
+  ReportData m_data;
 };
 
 }  // namespace warpath

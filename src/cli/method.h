@@ -33,14 +33,15 @@ struct PreparedMethod {
 /// ones.
 class MethodTrainer {
  public:
-  MethodTrainer(const Tracer& tracer, const TrainSettings& settings, std::filesystem::path init, bool quiet)
-      : m_tracer(tracer), m_settings(settings), m_init(std::move(init)), m_quiet(quiet) {}
+  MethodTrainer(std::shared_ptr<const Tracer> tracer, const TrainSettings& settings, std::filesystem::path init,
+                bool quiet)
+      : m_tracer(std::move(tracer)), m_settings(settings), m_init(std::move(init)), m_quiet(quiet) {}
   PreparedMethod prepare(const Method& method);
 
  private:
   std::shared_ptr<const Candidates> candidates(const Layout& layout, std::uint64_t count);
 
-  const Tracer& m_tracer;
+  std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;
   std::filesystem::path m_init;
   bool m_quiet;

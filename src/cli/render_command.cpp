@@ -25,13 +25,13 @@ struct RenderCommand {
     check_image_name(output);
     const Method method = parse_method(warp);
     const std::vector<Aov> aovs = parse_aovs(render.aov);
-    const Tracer tracer(load_scene(common, &render));
-    const Budget budget = make_budget(render, tracer.scene().sample_count);
+    const auto tracer = std::make_shared<const Tracer>(load_scene(common, &render));
+    const Budget budget = make_budget(render, tracer->scene().sample_count);
     const auto clock = start_clock();
 
     MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, common.quiet);
     const PreparedMethod prepared = trainer.prepare(method);
-    ImageEstimator estimator(tracer, method.layout, prepared.proposal, common.seed);
+    ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed);
     {
       StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);
       render_passes(estimator, budget, progress.callback(), [] {});
@@ -39,8 +39,8 @@ struct RenderCommand {
     if (estimator.cost().samples == 0) throw Interrupted{};
 
     ImageFile file = image_file(estimator.develop());
-    describe(file, tracer, method, common, estimator, clock());
-    add_aovs(file, tracer, aovs, common.seed);
+    describe(file, *tracer, method, common, estimator, clock());
+    add_aovs(file, *tracer, aovs, common.seed);
     write_image(output, file);
     if (estimator.non_finite() > 0)
       log::warn("{} of {} samples were not finite; they count as 0", estimator.non_finite(), estimator.cost().samples);

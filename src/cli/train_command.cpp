@@ -24,12 +24,12 @@ struct TrainCommand {
     if (method.family == "none" || method.family == "uniform" || !method.file.empty())
       throw ConfigError(
           fmt::format("--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree or realnvp", warp));
-    const Tracer tracer(load_scene(common, nullptr));
+    const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
     const TrainSettings settings = training.train_settings(common.seed);
     MethodTrainer trainer(tracer, settings, training.init, common.quiet);
     const PreparedMethod prepared = trainer.prepare(method);
 
-    WarpFile file{prepared.proposal, method.layout, tracer.scene().file.filename().string(), {}};
+    WarpFile file{prepared.proposal, method.layout, tracer->scene().file.filename().string(), {}};
     file.settings = {{"method", method.name},
                      {"examples", std::to_string(settings.examples)},
                      {"alpha", fmt::format("{}", settings.alpha)},
