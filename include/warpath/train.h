@@ -17,8 +17,13 @@ struct RealNvpSettings {
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
   double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)
   int batch = 2000;
-  int max_steps = 3000;    ///< training ends sooner, when the held-out likelihood no longer rises
-  double held_out = 0.05;  ///< share of the examples that is never trained on
+  int max_steps = 3000;      ///< training ends sooner, when the held-out likelihood no longer rises
+  double held_out = 0.05;    ///< share of the examples that is never trained on
+  double uniform = 0.0;      ///< trains the density (1 - uniform) q + uniform that a mixture will have, instead of q
+  double average = 0.99;     ///< decay per step of the moving average of the weights that is handed out; 0 for none
+  int evaluate_every = 100;  ///< steps between evaluations of the held-out likelihood
+  int patience = 3;    ///< evaluations without gain, after which the rate falls to a third, and at last training ends
+  int rate_drops = 2;  ///< how often the rate falls
 };
 /// The architecture that the authors of [ZZ19] released: 12 couplings, separate s and t, 512 wide, 8 blocks, rate 1e-4.
 RealNvpSettings released_realnvp();

@@ -6,6 +6,7 @@
 #include "warp/grid.h"
 #include "warp/kdtree.h"
 #include "warp/mixture.h"
+#include "warp/realnvp.h"
 #include "warp/uniform.h"
 #include "warpath/error.h"
 
@@ -23,7 +24,8 @@ std::shared_ptr<const Proposal> load_as(const TensorFile& file, const std::strin
 }
 
 constexpr std::array kFamilies{Family{"uniform", load_as<Uniform>}, Family{"grid", load_as<Grid>},
-                               Family{"kdtree", load_as<KdTree>}, Family{"mixture", load_as<Mixture>}};
+                               Family{"kdtree", load_as<KdTree>}, Family{"mixture", load_as<Mixture>},
+                               Family{"realnvp", load_as<RealNvp>}};
 
 }  // namespace
 

@@ -1,0 +1,76 @@
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "nn/simd.h"
+
+namespace warpath::nn {
+
+/// How the dense layers before a ReLU are normalised.
+enum class Norm {
+  none,
+  actnorm,  ///< a learned gain per neuron, set from data at the start (Kingma and Dhariwal 2018); folded into the
+            ///< weights
+  batch,    ///< batch normalisation (Ioffe and Szegedy 2015); its statistics are folded in for use
+};
+
+/// One dense layer's place in the network's parameters. Rows of the weights are padded_inputs(inputs) apart.
+struct DenseLayer {
+  int inputs = 0, outputs = 0;
+  std::size_t weight = 0, bias = 0;
+  std::size_t gain = 0;  ///< if normalised
+  bool normalised = false;
+  std::size_t packed = 0, packed_back = 0;  ///< place in the packed weights, and in the packed transposes
+};
+
+/// The conditioner of [ZZ19]: dense -> residual blocks of two dense layers each -> dense.
+///   h_0 = relu(N(W x));  a = relu(N(W h)), h' = relu(h + N(W a)) for each block;  out = W h.
+class ResidualNet {
+ public:
+  ResidualNet() = default;
+  /// width is a multiple of 16; inputs may be 0: then the outputs are constants that are learned.
+  ResidualNet(int inputs, int width, int blocks, int outputs, Norm norm);
+
+  int inputs() const { return m_layers.front().inputs; }
+  int outputs() const { return m_layers.back().outputs; }
+  int width() const { return m_width; }
+  const std::vector<DenseLayer>& layers() const { return m_layers; }  ///< in, then pairs, then out
+  std::size_t parameter_count() const { return m_parameters; }        ///< padding included; a multiple of 16
+  std::size_t packed_count() const { return m_packed; }
+  std::size_t packed_back_count() const { return m_packed_back; }
+  /// Floats that `forward` keeps for `backward`: the activations of every hidden layer.
+  std::size_t activation_count() const { return (m_layers.size() - 1) * static_cast<std::size_t>(m_width * kBlock); }
+  /// Multiply-adds of one sample's forward pass.
+  std::size_t multiply_adds() const;
+
+  /// Uniform weights with the variance 2 / inputs (He et al. 2015), zero biases, gains 1; the last layer is scaled by
+  /// `last`. `key` seeds them.
+  void initialise(float* parameters, std::uint64_t key, float last) const;
+
+  void pack(const float* parameters, float* packed) const;
+  void pack_back(const float* parameters, float* packed_back) const;
+
+  /// One block. x: inputs x kBlock; out: outputs x kBlock; activations: activation_count() floats, each layer's in
+  /// turn.
+  void forward(const float* packed, const float* x, float* activations, float* out) const;
+  /// The same without keeping anything: scratch holds 2 * width * kBlock floats.
+  void infer(const float* packed, const float* x, float* scratch, float* out) const;
+
+  /// Gradients of one block, from those of its outputs (outputs x kBlock). gradients has the layout of the parameters,
+  /// of the weights as they are packed (gains folded in: see unfold). xt: the inputs, transposed. d_x: inputs x kBlock;
+  /// it is added to what is there if `accumulate_x`. scratch: scratch_count() floats.
+  void backward(const float* packed_back, const float* xt, const float* activations, const float* d_out,
+                float* gradients, bool accumulate, float* d_x, bool accumulate_x, float* scratch) const;
+  std::size_t scratch_count() const { return 3 * static_cast<std::size_t>(m_width * kBlock); }
+
+  /// Turns gradients of the folded weights W = gain * V into those of V and gain, in place.
+  void unfold(const float* parameters, float* gradients) const;
+
+ private:
+  int m_width = 0;
+  std::vector<DenseLayer> m_layers;
+  std::size_t m_parameters = 0, m_packed = 0, m_packed_back = 0;
+};
+
+}  // namespace warpath::nn

@@ -1,0 +1,269 @@
+#include "warp/realnvp_flow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/rng.h"
+#include "nn/dense.h"
+#include "warp/realnvp_kernels.h"
+#include "warpath/error.h"
+
+namespace warpath::realnvp {
+namespace {
+
+using nn::kBlock;
+
+nn::Norm norm_of(RealNvpSettings::Norm norm) {
+  switch (norm) {
+    case RealNvpSettings::Norm::none:
+      return nn::Norm::none;
+    case RealNvpSettings::Norm::actnorm:
+      return nn::Norm::actnorm;
+    case RealNvpSettings::Norm::batch:
+      return nn::Norm::batch;
+  }
+  throw InternalError("unknown normalisation");
+}
+
+const float* row(const float* rows, std::size_t r) { return rows + r * kBlock; }
+float* row(float* rows, std::size_t r) { return rows + r * kBlock; }
+float* row(float* rows, int r) { return rows + static_cast<std::size_t>(r) * kBlock; }
+const float* row(const float* rows, int r) { return rows + static_cast<std::size_t>(r) * kBlock; }
+
+}  // namespace
+
+Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings(settings) {
+  if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
+  WARPATH_CHECK(dims >= 1);
+  for (int c = 0; c < settings.couplings; ++c) {
+    Coupling coupling;
+    // Alternating masks [DSB17]. A single dimension has nothing to be conditioned on: its networks have no inputs.
+    for (int i = 0; i < dims; ++i) (dims > 1 && i % 2 == c % 2 ? coupling.kept : coupling.moved).push_back(i);
+    const int kept = static_cast<int>(coupling.kept.size()), moved = static_cast<int>(coupling.moved.size());
+    for (int n = 0; n < (settings.shared ? 1 : 2); ++n) {
+      nn::ResidualNet net(kept, settings.width, settings.blocks, settings.shared ? 2 * moved : moved,
+                          norm_of(settings.norm));
+      coupling.parameters.push_back(std::exchange(m_parameters, m_parameters + net.parameter_count()));
+      coupling.packed.push_back(std::exchange(m_packed, m_packed + net.packed_count()));
+      coupling.packed_back.push_back(std::exchange(m_packed_back, m_packed_back + net.packed_back_count()));
+      coupling.activations.push_back(std::exchange(m_activations, m_activations + net.activation_count()));
+      coupling.nets.push_back(std::move(net));
+    }
+    coupling.scales = std::exchange(m_parameters, m_parameters + static_cast<std::size_t>(nn::round_up(moved, 16)));
+    m_most_kept = std::max(m_most_kept, coupling.kept.size());
+    m_most_moved = std::max(m_most_moved, coupling.moved.size());
+    m_couplings.push_back(std::move(coupling));
+  }
+}
+
+std::vector<ParameterView> Flow::views() const {
+  std::vector<ParameterView> views;
+  for (std::size_t c = 0; c < m_couplings.size(); ++c) {
+    const Coupling& coupling = m_couplings[c];
+    for (std::size_t n = 0; n < coupling.nets.size(); ++n)
+      for (std::size_t l = 0; l < coupling.nets[n].layers().size(); ++l) {
+        const nn::DenseLayer& layer = coupling.nets[n].layers()[l];
+        const std::string name = fmt::format("coupling{}.{}.layer{}.", c,
+                                             m_settings.shared ? "st"
+                                             : n == 0          ? "s"
+                                                               : "t",
+                                             l);
+        const std::size_t at = coupling.parameters[n];
+        const std::size_t rows = static_cast<std::size_t>(layer.outputs), cols = static_cast<std::size_t>(layer.inputs);
+        views.push_back({name + "weight", at + layer.weight, rows, cols,
+                         static_cast<std::size_t>(nn::padded_inputs(layer.inputs))});
+        views.push_back({name + "bias", at + layer.bias, rows, 1, 1});
+        if (layer.normalised) views.push_back({name + "gain", at + layer.gain, rows, 1, 1});
+      }
+    views.push_back({fmt::format("coupling{}.scale", c), coupling.scales, coupling.moved.size(), 1, 1});
+  }
+  return views;
+}
+
+std::size_t Flow::multiply_adds() const {
+  std::size_t sum = 0;
+  for (const Coupling& coupling : m_couplings)
+    for (const nn::ResidualNet& net : coupling.nets) sum += net.multiply_adds();
+  return sum;
+}
+
+nn::AlignedVector<float> Flow::initial(std::uint64_t seed) const {
+  nn::AlignedVector<float> parameters(m_parameters, 0.0f);
+  std::uint64_t id = 0;
+  for (const Coupling& coupling : m_couplings)
+    for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
+      const nn::ResidualNet& net = coupling.nets[n];
+      float* at = parameters.data() + coupling.parameters[n];
+      net.initialise(at, sample_key(seed, id++), 1.0f);
+      const nn::DenseLayer& last = net.layers().back();
+      const int first_t = m_settings.shared ? net.outputs() / 2 : n == 0 ? net.outputs() : 0;
+      const int stride = nn::padded_inputs(last.inputs);
+      std::fill(at + last.weight + first_t * stride, at + last.weight + net.outputs() * stride, 0.0f);
+    }
+  return parameters;
+}
+
+void Flow::resize(Packed& packed, bool back) const {
+  packed.forward.resize(m_packed);
+  packed.back.resize(back ? m_packed_back : 0);
+  packed.scales.resize(m_parameters == 0 ? 0 : m_couplings.size() * m_most_moved);
+}
+
+void Flow::pack_coupling(std::size_t c, const float* parameters, Packed& packed) const {
+  const Coupling& coupling = m_couplings[c];
+  for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
+    const float* at = parameters + coupling.parameters[n];
+    coupling.nets[n].pack(at, packed.forward.data() + coupling.packed[n]);
+    if (!packed.back.empty()) coupling.nets[n].pack_back(at, packed.back.data() + coupling.packed_back[n]);
+  }
+  std::copy_n(parameters + coupling.scales, coupling.moved.size(), packed.scales.data() + c * m_most_moved);
+}
+
+void Flow::pack(const float* parameters, Packed& packed, bool back) const {
+  resize(packed, back);
+  for (std::size_t c = 0; c < m_couplings.size(); ++c) pack_coupling(c, parameters, packed);
+}
+
+// Inference: v at the start, v now, inputs, heads, and what ResidualNet::infer needs.
+std::size_t Flow::scratch_count() const {
+  const std::size_t dims = static_cast<std::size_t>(m_dims), width = static_cast<std::size_t>(m_settings.width);
+  return (2 * dims + m_most_kept + 2 * m_most_moved + 2 * width) * kBlock;
+}
+
+void Flow::condition(const Coupling& coupling, const Packed& packed, const float* v, float* x, float* scratch,
+                     float* heads) const {
+  for (std::size_t k = 0; k < coupling.kept.size(); ++k) encode(row(v, coupling.kept[k]), row(x, k));
+  for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
+    coupling.nets[n].infer(packed.forward.data() + coupling.packed[n], x, scratch, heads);
+    heads += coupling.nets[n].outputs() * kBlock;
+  }
+}
+
+void Flow::forward(const Packed& packed, const double* z, double* y, double* log_det, float* scratch) const {
+  float* start = scratch;
+  float* v = row(start, m_dims);
+  float* x = row(v, m_dims);
+  float* heads = row(x, m_most_kept);
+  float* rest = row(heads, 2 * m_most_moved);
+  for (int i = 0; i < m_dims; ++i) logit(z + i * kBlock, row(start, i));
+  std::copy_n(start, m_dims * kBlock, v);
+  std::fill_n(log_det, kBlock, 0.0);
+  for (std::size_t c = 0; c < m_couplings.size(); ++c) {
+    const Coupling& coupling = m_couplings[c];
+    condition(coupling, packed, v, x, rest, heads);
+    for (std::size_t k = 0; k < coupling.moved.size(); ++k)
+      couple(packed.scales[c * m_most_moved + k], row(heads, k), row(heads, coupling.moved.size() + k),
+             row(v, coupling.moved[k]), log_det);
+  }
+  for (int i = 0; i < m_dims; ++i) shift_logit(z + i * kBlock, row(start, i), row(v, i), y + i * kBlock, log_det);
+}
+
+void Flow::inverse(const Packed& packed, const double* y, double* z, double* log_det, float* scratch) const {
+  float* start = scratch;
+  float* v = row(start, m_dims);
+  float* x = row(v, m_dims);
+  float* heads = row(x, m_most_kept);
+  float* rest = row(heads, 2 * m_most_moved);
+  for (int i = 0; i < m_dims; ++i) logit(y + i * kBlock, row(start, i));
+  std::copy_n(start, m_dims * kBlock, v);
+  std::fill_n(log_det, kBlock, 0.0);
+  for (std::size_t c = m_couplings.size(); c-- > 0;) {
+    const Coupling& coupling = m_couplings[c];
+    condition(coupling, packed, v, x, rest, heads);
+    for (std::size_t k = 0; k < coupling.moved.size(); ++k)
+      uncouple(packed.scales[c * m_most_moved + k], row(heads, k), row(heads, coupling.moved.size() + k),
+               row(v, coupling.moved[k]), log_det);
+  }
+  for (int i = 0; i < m_dims; ++i) shift_logit(y + i * kBlock, row(start, i), row(v, i), z + i * kBlock, log_det);
+}
+
+// Training: v before each coupling and at the end, every coupling's heads and activations; then inputs, their transpose
+// and gradient, gradients of heads and v, weights, log q, and what ResidualNet::backward needs.
+std::size_t Flow::training_scratch_count() const {
+  const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
+  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_kept)));
+  return m_activations + m_couplings[0].nets[0].scratch_count() +
+         ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
+}
+
+double Flow::train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
+                         bool accumulate, float* scratch) const {
+  const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
+  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_kept)));
+  const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };
+  float* const v = take((couplings + 1) * dims);
+  float* const d_v = take(dims);
+  float* const heads = take(couplings * 2 * m_most_moved);
+  float* const d_heads = take(2 * m_most_moved);
+  float* const x = take(inputs);
+  float* const xt = take(inputs);
+  float* const d_x = take(inputs);
+  float* const sample_weight = take(1);
+  double* const log_q = reinterpret_cast<double*>(take(2));
+  float* const activations = scratch;
+  float* const rest = activations + m_activations;
+
+  // y -> z, keeping everything. v + c dims: the numbers above coupling c, v itself: those of z.
+  float* now = v + couplings * dims * kBlock;
+  std::fill_n(log_q, kBlock, 0.0);
+  for (std::size_t i = 0; i < dims; ++i) {
+    logit(y + i * kBlock, row(now, i));
+    add_log_logistic(row(now, i), true, log_q);
+  }
+  for (std::size_t c = couplings; c-- > 0; now -= dims * kBlock) {
+    const Coupling& coupling = m_couplings[c];
+    const std::size_t moved = coupling.moved.size();
+    float* h = heads + c * 2 * m_most_moved * kBlock;
+    float* next = now - dims * kBlock;
+    for (std::size_t k = 0; k < coupling.kept.size(); ++k) encode(row(now, coupling.kept[k]), row(x, k));
+    for (std::size_t n = 0; n < coupling.nets.size(); ++n)
+      coupling.nets[n].forward(packed.forward.data() + coupling.packed[n], x, activations + coupling.activations[n],
+                               row(h, n * moved));
+    std::copy_n(now, dims * kBlock, next);
+    for (std::size_t k = 0; k < moved; ++k)
+      uncouple(packed.scales[c * m_most_moved + k], row(h, k), row(h, moved + k), row(next, coupling.moved[k]), log_q);
+  }
+  for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(v, i), false, log_q);
+
+  // The mixture's density passes on the share of its gradient that is due to q.
+  double loss = 0;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    sample_weight[i] = weight[i];
+    if (weight[i] == 0) continue;
+    double log_density = log_q[i];
+    if (uniform > 0) {
+      const double q = (1 - uniform) * std::exp(std::min(log_q[i], 700.0));
+      log_density = std::log(q + uniform);
+      sample_weight[i] *= static_cast<float>(q / (q + uniform));
+    }
+    loss -= static_cast<double>(weight[i]) * log_density;
+  }
+
+  for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(sample_weight, row(v, i), row(d_v, i));
+  now = v + dims * kBlock;
+  for (std::size_t c = 0; c < couplings; ++c, now += dims * kBlock) {
+    const Coupling& coupling = m_couplings[c];
+    const std::size_t kept = coupling.kept.size(), moved = coupling.moved.size();
+    const float* h = heads + c * 2 * m_most_moved * kBlock;
+    for (std::size_t k = 0; k < moved; ++k) {
+      const std::size_t i = static_cast<std::size_t>(coupling.moved[k]);
+      const float d_scale =
+          uncouple_backward(packed.scales[c * m_most_moved + k], row(h, k), row(h, moved + k), sample_weight,
+                            row(now, i), row(d_v, i), row(d_heads, k), row(d_heads, moved + k));
+      float& sum = gradients[coupling.scales + k];
+      sum = accumulate ? sum + d_scale : d_scale;
+    }
+    for (std::size_t k = 0; k < kept; ++k) encode(row(now, coupling.kept[k]), row(x, k));
+    nn::transpose(static_cast<int>(kept), x, xt);
+    for (std::size_t n = 0; n < coupling.nets.size(); ++n)
+      coupling.nets[n].backward(packed.back.data() + coupling.packed_back[n], xt, activations + coupling.activations[n],
+                                row(d_heads, n * moved), gradients + coupling.parameters[n], accumulate, d_x, n > 0,
+                                rest);
+    for (std::size_t k = 0; k < kept; ++k)
+      encode_backward(row(now, coupling.kept[k]), row(d_x, k), row(d_v, coupling.kept[k]));
+  }
+  return loss;
+}
+
+}  // namespace warpath::realnvp
