@@ -9,7 +9,7 @@ namespace warpath {
 
 /// The random numbers of a path have names, in the order in which a path uses them.
 enum class GroupKind : std::uint8_t {
-  film,      ///< 2: position on the film, [0,1)^2 over the whole image, x to the right and y down
+  film,      ///< 2: position on the film, [0,1)^2 over the crop window, x to the right and y down
   lens,      ///< 2: position on the aperture
   time,      ///< 1: instant between shutter open and close
   light,     ///< 1: which emitter

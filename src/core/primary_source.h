@@ -34,6 +34,8 @@ class PrimarySource {
   /// function of y.
   virtual bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
                     float* u1, float* inv_q) = 0;
+  /// Whether draws at vertices shall come with a context; without, they get null, which is cheaper.
+  virtual bool wants_context() const { return false; }
 };
 
 /// Uniform numbers from the counter-based streams of the samples `ids`.

@@ -38,8 +38,8 @@ class Tracer {
   /// Directly seen emission alone; draws film, lens and time.
   void trace_emission(PrimarySource& source, std::size_t lanes, PathResults& results) const;
   void trace_first_hits(PrimarySource& source, std::size_t lanes, FirstHits& hits) const;
-  /// For each pixel of the film (row-major): whether a camera ray through it may see an emitter directly. Conservative:
-  /// a pixel marked 0 sees none for certain.
+  /// For each pixel of the film's crop window (row-major): whether a camera ray through it may see an emitter directly.
+  /// Conservative: a pixel marked 0 sees none for certain.
   const std::vector<std::uint8_t>& may_see_emission() const;
 
  private:

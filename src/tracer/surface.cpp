@@ -1,0 +1,142 @@
+#include "tracer/surface.h"
+
+#include "tracer/sampling.h"
+
+namespace warpath {
+namespace {
+
+// (dp_du, dp_dv) from the change of p along the two barycentric axes. Zero where the texture coordinates are
+// degenerate.
+void to_uv_basis(const Vec2& duv1, const Vec2& duv2, const Vec3& d1, const Vec3& d2, Vec3& along_u, Vec3& along_v) {
+  const float determinant = duv1.x * duv2.y - duv1.y * duv2.x;
+  const float inverse = determinant != 0 ? 1 / determinant : 0.0f;
+  along_u = (d1 * duv2.y - d2 * duv1.y) * inverse;
+  along_v = (d2 * duv1.x - d1 * duv2.x) * inverse;
+}
+
+}  // namespace
+
+Matrix4 rectangle_matrix(const Rectangle& rectangle, float time) {
+  return rectangle.to_world[0] == rectangle.to_world[1] ? rectangle.to_world[0]
+                                                        : lerp(rectangle.to_world[0], rectangle.to_world[1], time);
+}
+Vec3 rectangle_normal(const Rectangle& rectangle, float time) {
+  const Vec3 up(0, 0, rectangle.flip_normals ? -1.0f : 1.0f);
+  return transform_normal(rectangle_matrix(rectangle, time).inverse(), up).normalized();
+}
+
+Surfaces::Surfaces(std::span<const Shape> shapes, const Materials& materials) {
+  m_analytic.resize(shapes.size());
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const Shape& shape = shapes[i];
+    Entry& entry = m_shapes.emplace_back();
+    entry.bsdf = shape.bsdf;
+    entry.emitter = shape.emitter;
+    entry.needs_tangents = shape.bsdf >= 0 && materials.needs_tangents(shape.bsdf);
+    entry.needs_uv = entry.needs_tangents || shape.emitter >= 0 || (shape.bsdf >= 0 && materials.needs_uv(shape.bsdf));
+    if ((entry.mesh = std::get_if<Mesh>(&shape.geometry))) {
+      m_any_moves |= !entry.mesh->positions_end.empty();
+    } else if ((entry.rectangle = std::get_if<Rectangle>(&shape.geometry))) {
+      entry.rectangle_normal = warpath::rectangle_normal(*entry.rectangle, 0);
+      m_any_moves |= entry.rectangle->to_world[0] != entry.rectangle->to_world[1];
+    } else {
+      if (const auto* sphere = std::get_if<Sphere>(&shape.geometry))
+        m_owned.push_back(std::make_unique<AnalyticShape>(*sphere));
+      else if (const auto* disk = std::get_if<Disk>(&shape.geometry))
+        m_owned.push_back(std::make_unique<AnalyticShape>(*disk));
+      else
+        m_owned.push_back(std::make_unique<AnalyticShape>(std::get<Cylinder>(shape.geometry)));
+      m_analytic[i] = entry.analytic = m_owned.back().get();
+      m_any_moves |= entry.analytic->moves();
+    }
+  }
+}
+
+Vec3 Surfaces::at(const HitStream& hits, std::size_t i, const RayStream& rays, SurfacePoint& point) const {
+  const Entry& shape = m_shapes[hits.shape[i]];
+  const Vec3 position = rays.origin(i) + rays.direction(i) * hits.t[i];
+  point.wi = -rays.direction(i);
+  if (shape.mesh) {
+    point.ng = Vec3(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
+    mesh_at(shape, hits.primitive[i], hits.u[i], hits.v[i], rays.time[i], point);
+    return position;
+  }
+  if (shape.rectangle) {
+    rectangle_at(shape, hits.primitive[i], hits.u[i], hits.v[i], rays.time[i], point);
+    return position;
+  }
+  const AnalyticShape::Surface surface = shape.analytic->at(position, rays.time[i]);
+  point.ng = point.ns = surface.normal;
+  point.uv = surface.uv;
+  point.dp_du = surface.dp_du, point.dp_dv = surface.dp_dv;
+  point.dn_du = surface.dn_du, point.dn_dv = surface.dn_dv;
+  return surface.position;
+}
+
+void Surfaces::mesh_at(const Entry& shape, std::uint32_t primitive, float u, float v, float time,
+                       SurfacePoint& point) const {
+  const Mesh& mesh = *shape.mesh;
+  const std::uint32_t* index = mesh.indices.data() + 3 * static_cast<std::size_t>(primitive);
+  const std::uint32_t i0 = index[0], i1 = index[1], i2 = index[2];
+  const float side = mesh.flip_normals ? -1.0f : 1.0f;
+  point.ng *= side;
+
+  Vec3 dn1(0), dn2(0);  // change of the shading normal along the barycentric axes
+  if (mesh.normals.empty()) {
+    point.ns = point.ng;
+  } else {
+    Vec3 n0 = mesh.normals[i0], n1 = mesh.normals[i1], n2 = mesh.normals[i2];
+    if (!mesh.normals_end.empty()) {
+      n0 = lerp(n0, mesh.normals_end[i0], time);
+      n1 = lerp(n1, mesh.normals_end[i1], time);
+      n2 = lerp(n2, mesh.normals_end[i2], time);
+    }
+    const Vec3 n = n0 * (1 - u - v) + n1 * u + n2 * v;
+    const float inverse_length = side / std::sqrt(n.dot(n));
+    point.ns = n * inverse_length;
+    if (shape.needs_tangents) {
+      const auto project = [&](const Vec3& d) { return d - point.ns * point.ns.dot(d); };
+      dn1 = project((n1 - n0) * inverse_length);
+      dn2 = project((n2 - n0) * inverse_length);
+    }
+  }
+
+  if (!shape.needs_uv) return;
+  Vec2 duv1(1, 0), duv2(0, 1);
+  if (mesh.uvs.empty()) {
+    // Mitsuba turns a triangle by naming its vertices backwards, which changes who is first.
+    point.uv = mesh.flip_normals ? Vec2(u, 1 - u - v) : Vec2(u, v);
+    if (mesh.flip_normals) duv1 = {1, -1}, duv2 = {0, -1};
+  } else {
+    const Vec2 uv0 = mesh.uvs[i0];
+    duv1 = mesh.uvs[i1] - uv0;
+    duv2 = mesh.uvs[i2] - uv0;
+    point.uv = uv0 + duv1 * u + duv2 * v;
+  }
+  if (!shape.needs_tangents) return;
+  Vec3 p0 = mesh.positions[i0], p1 = mesh.positions[i1], p2 = mesh.positions[i2];
+  if (!mesh.positions_end.empty()) {
+    p0 = lerp(p0, mesh.positions_end[i0], time);
+    p1 = lerp(p1, mesh.positions_end[i1], time);
+    p2 = lerp(p2, mesh.positions_end[i2], time);
+  }
+  to_uv_basis(duv1, duv2, p1 - p0, p2 - p0, point.dp_du, point.dp_dv);
+  to_uv_basis(duv1, duv2, dn1, dn2, point.dn_du, point.dn_dv);
+}
+
+void Surfaces::rectangle_at(const Entry& shape, std::uint32_t primitive, float u, float v, float time,
+                            SurfacePoint& point) const {
+  const Rectangle& rectangle = *shape.rectangle;
+  const bool moves = rectangle.to_world[0] != rectangle.to_world[1];
+  point.ng = point.ns = moves ? warpath::rectangle_normal(rectangle, time) : shape.rectangle_normal;
+  if (!shape.needs_uv) return;
+  // The triangles are (00, 10, 01) and (10, 11, 01).
+  point.uv = primitive == 0 ? Vec2(u, v) : Vec2(1 - v, u + v);
+  if (!shape.needs_tangents) return;
+  const Matrix4 m = rectangle_matrix(rectangle, time);
+  point.dp_du = transform_vector(m, {2, 0, 0});
+  point.dp_dv = transform_vector(m, {0, 2, 0});
+  point.dn_du = point.dn_dv = Vec3(0);
+}
+
+}  // namespace warpath

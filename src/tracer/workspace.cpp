@@ -1,0 +1,73 @@
+#include "tracer/workspace.h"
+
+#include "warpath/error.h"
+
+namespace warpath {
+
+void Arena::reset(std::size_t n) {
+  m_stride = (n + kPad - 1) / kPad * kPad + kPad;
+  m_used = 0;
+  if (kArrays * m_stride <= m_capacity) return;
+  m_capacity = kArrays * m_stride;
+  m_memory = std::make_unique<float[]>(m_capacity);
+}
+
+void* Arena::next() {
+  WARPATH_CHECK(m_used < kArrays);
+  return m_memory.get() + m_stride * m_used++;
+}
+
+VertexContext ContextArrays::view() const {
+  return {position.pointers(), normal.pointers(), wi.pointers(), albedo.pointers(), roughness, kind, material};
+}
+
+void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_t from) const {
+  position.set(to, source.position[from]);
+  normal.set(to, source.normal[from]);
+  wi.set(to, source.wi[from]);
+  albedo.set(to, source.albedo[from]);
+  roughness[to] = source.roughness[from];
+  kind[to] = source.kind[from];
+  material[to] = source.material[from];
+}
+
+void Workspace::resize(std::size_t n) {
+  m_arena.reset(n);
+  const auto floats = [&] { return m_arena.take<float>(); };
+  const auto indices = [&] { return m_arena.take<std::uint32_t>(); };
+  const auto bytes = [&] { return m_arena.take<std::uint8_t>(); };
+  const auto vectors = [&] { return Vec3Array{floats(), floats(), floats()}; };
+  const auto ray_stream = [&] {
+    return RayStream{floats(), floats(), floats(), floats(), floats(), floats(), floats(), floats()};
+  };
+  const auto numbers = [&] { return DrawnNumbers{floats(), floats(), floats()}; };
+  const auto contexts = [&] {
+    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices()};
+  };
+  beta = vectors();
+  weight = floats();
+  eta = floats();
+  previous = vectors();
+  previous_pdf = floats();
+  straight = bytes();
+  lanes = indices();
+  rays = ray_stream();
+  hits = {floats(), floats(), floats(), floats(), floats(), floats(), indices(), indices()};
+  vertex_lanes = indices();
+  position = vectors();
+  ng = vectors();
+  time = floats();
+  if (scatter.size() < n) scatter.resize(n);
+  context = contexts();
+  film = numbers(), lens = numbers(), shutter = numbers();
+  light = numbers(), light_uv = numbers(), lobe = numbers(), dir = numbers(), roulette = numbers();
+  subset = indices();
+  subset_lanes = indices();
+  subset_context = contexts();
+  shadow_rays = ray_stream();
+  shadow_vertex = indices();
+  shadow_light = vectors();
+  shadowed = bytes();
+}
+
+}  // namespace warpath
