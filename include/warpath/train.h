@@ -30,6 +30,8 @@ RealNvpSettings released_realnvp();
 
 struct KdTreeSettings {
   enum class Target { mean, second_moment } target = Target::mean;  ///< density of a cell ~ mean g, or sqrt(E[g^2])
+  /// cyclic: brightest cell first, in the middle, dimensions in turn, as in [GBBE18]; best: wherever a split gains most
+  enum class Split { cyclic, best } split = Split::best;
   int max_leaves = 1 << 14;
   int min_samples = 50;  ///< candidates in a leaf
   double shrink = 30;    ///< a cell's mean is drawn to its parent's as if by that many samples

@@ -1,0 +1,17 @@
+#pragma once
+#include <memory>
+
+#include "train/training_data.h"
+#include "warp/grid.h"
+#include "warpath/train.h"
+
+namespace warpath {
+
+/// Fits VEGAS's separable map (Lepage 1978) to examples that are weighted by g. One set of examples serves all
+/// iterations: in each, every example counts with g^2 / q of the map so far, as if the map had drawn it. Starts from
+/// `init`, or the identity, and hands out the map with the least second moment of g / q. The same for any number of
+/// threads.
+std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSettings& settings,
+                                     const Grid* init = nullptr);
+
+}  // namespace warpath

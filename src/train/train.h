@@ -1,0 +1,19 @@
+#pragma once
+#include <cstdint>
+
+#include "train/training_data.h"
+#include "warpath/train.h"
+
+namespace warpath {
+
+/// |T| = alpha |S|: how many candidates the settings ask for, for every family the same.
+std::uint64_t candidate_count(const TrainSettings& settings);
+
+/// Fits the family that the settings name, and mixes it with the uniform proposal (unless settings.uniform is 0). Real
+/// NVP learns from settings.examples resampled candidates, the others from all candidates, weighted. `init`: a proposal
+/// to start from, mixtures looked into; for realnvp and grid. Where no candidate has any light the uniform proposal
+/// comes back. Throws ConfigError for settings that make no sense, and Interrupted if nothing is learned yet when
+/// g_interrupted is set.
+Fit train(const Candidates& candidates, const TrainSettings& settings, const Proposal* init = nullptr);
+
+}  // namespace warpath
