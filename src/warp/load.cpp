@@ -24,8 +24,8 @@ std::shared_ptr<const Proposal> load_as(const TensorFile& file, const std::strin
 }
 
 constexpr std::array kFamilies{Family{"uniform", load_as<Uniform>}, Family{"grid", load_as<Grid>},
-                               Family{"kdtree", load_as<KdTree>}, Family{"mixture", load_as<Mixture>},
-                               Family{"realnvp", load_as<RealNvp>}};
+                               Family{"kdtree", load_as<KdTree>}, Family{"realnvp", load_as<RealNvp>},
+                               Family{"mixture", load_as<Mixture>}};
 
 }  // namespace
 
