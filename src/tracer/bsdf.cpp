@@ -8,15 +8,9 @@ namespace warpath {
 
 namespace {
 
-Frame frame_at(const Scatter& scatter, int frame) {
-  if (frame == 0) return scatter.frame;
-  const float* v = &scatter.values[scatter.perturbed[frame - 1].first_value];
-  return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}};
-}
-
 /// The frame as the lobe sees it.
 Frame frame_of(const Scatter& scatter, const ScatterLobe& lobe) {
-  Frame f = frame_at(scatter, lobe.frame);
+  Frame f = scatter_frame(scatter, lobe.frame);
   if (lobe.mirrored) f.n = -f.n;
   return f;
 }
@@ -27,8 +21,8 @@ float map_factor(const Scatter& scatter, const ScatterLobe& lobe, const Vec3& wo
   float factor = 1;
   for (int frame = lobe.frame; frame != 0;) {
     const PerturbedFrame& p = scatter.perturbed[frame - 1];
-    const Vec3 inner_n = frame_at(scatter, frame).n;
-    Vec3 outer_n = frame_at(scatter, p.outer).n;
+    const Vec3 inner_n = scatter_normal(scatter, frame);
+    Vec3 outer_n = scatter_normal(scatter, p.outer);
     if (p.mirrored) outer_n = -outer_n;
     const float cos_outer = wo.dot(outer_n);
     if (!(wo.dot(inner_n) * cos_outer > 0)) return 0;
@@ -90,7 +84,14 @@ BsdfSample sample_bsdf(const Scatter& scatter, float u, const Vec2& dir) {
   result.delta = s.delta;
   result.null = s.null;
   if (s.null) result.wo = -scatter.wi;
-  if (lobe->frame != 0) result.weight *= map_factor(scatter, *lobe, result.wo);
+  const float factor = lobe->frame == 0 ? 1 : map_factor(scatter, *lobe, result.wo);
+  if (s.pdf == 0 || factor == 0) {
+    // Nothing was sampled; other lobes have no say, since this direction is not drawn with the density of any.
+    result.weight = Color(0.0f);
+    result.pdf = 0;
+    return result;
+  }
+  result.weight *= factor;
   // A delta lobe has its direction for itself. (Mitsuba 3.9 adds the densities of other lobes to its probability.)
   if (s.delta || scatter.lobe_count == 1) return result;
 
@@ -160,7 +161,7 @@ Vec3 shading_normal(const Scatter& scatter) {
   // Of the lobe with the largest share.
   const ScatterLobe* lobe = std::max_element(scatter.lobes.data(), lobes_end(scatter),
                                              [](const auto& a, const auto& b) { return a.weight < b.weight; });
-  const Vec3 n = frame_at(scatter, lobe->frame).n;
+  const Vec3 n = scatter_normal(scatter, lobe->frame);
   return n.dot(scatter.wi) < 0 ? -n : n;
 }
 

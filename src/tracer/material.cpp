@@ -84,7 +84,7 @@ class Resolver {
   // walk() is never deeper than the scene nests, and no lobe is lost: compile_materials has checked the worst case.
 
   float cos_theta_i(const Place& place) const {
-    const float c = place.frame == 0 ? m_cos_theta_i : m_point.wi.dot(perturbed_frame(place.frame).n);
+    const float c = place.frame == 0 ? m_cos_theta_i : m_point.wi.dot(scatter_normal(m_scatter, place.frame));
     return place.behind ? -c : c;
   }
 
@@ -144,6 +144,9 @@ class Resolver {
   }
 
   void put(float x) { m_scatter.values[m_scatter.value_count++] = x; }
+  void put(const Vec3& v) {
+    for (int i = 0; i < 3; ++i) put(v[i]);
+  }
   void put_color(TextureId t) {
     const Color c = m_materials.textures.color(t, m_point.uv);
     put(c.x);
@@ -153,14 +156,9 @@ class Resolver {
   void put_scalar(TextureId t) { put(m_materials.textures.scalar(t, m_point.uv)); }
   void put_scalar(bool there, TextureId t) { put(there ? m_materials.textures.scalar(t, m_point.uv) : 0); }
 
-  Frame perturbed_frame(int frame) const {
-    const float* v = &m_scatter.values[m_scatter.perturbed[frame - 1].first_value];
-    return {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}};
-  }
-
   /// The frame that a map starts from: along the tangents, not mirrored.
   Frame outer_frame(const Place& place) const {
-    if (place.frame != 0) return perturbed_frame(place.frame);
+    if (place.frame != 0) return scatter_frame(m_scatter, place.frame);
     return frame_of_tangent(m_point.ns, m_point.dp_du, m_point.left_handed);
   }
 
@@ -191,20 +189,15 @@ class Resolver {
       if (wi.z * wi.dot(local) <= 0) local = {-local.x, -local.y, local.z};
     }
     const Vec3 normal = frame.to_world(local).normalized();
-    Frame turned;
-    if (n.anisotropic) {
-      const bool left_handed = frame.s.cross(frame.t).dot(frame.n) < 0;
-      turned = frame_of_tangent(normal, n.type == Type::bump_map ? m_point.dp_du : frame.s, left_handed);
-    } else {
-      turned = frame_of_normal(normal);
-    }
     PerturbedFrame& p = m_scatter.perturbed[m_scatter.perturbed_count++];
     p.first_value = m_scatter.value_count;
     p.outer = place.frame;
+    p.follows_tangent = n.follows_tangent;
+    p.left_handed = frame.s.cross(frame.t).dot(frame.n) < 0;
     p.mirrored = mirrored(place);
     p.shadowed = n.shadowed;
-    for (const Vec3& axis : {turned.s, turned.t, turned.n})
-      for (int i = 0; i < 3; ++i) put(axis[i]);
+    put(normal);
+    if (n.follows_tangent) put(n.type == Type::bump_map ? m_point.dp_du : frame.s);
     return {place.weight, m_scatter.perturbed_count, false};
   }
 

@@ -214,7 +214,9 @@ class Compiler {
     n.needs_tangents = true;
     n.tangent_frame = false;
     n.turns_to_wi = true;  // its lobes have a frame of their own
-    n.value_count += 9;
+    n.follows_tangent = n.anisotropic;
+    n.anisotropic = true;
+    n.value_count += n.follows_tangent ? 6 : 3;
     ++n.perturbed;
   }
   void set(MaterialNode& n, const BumpMap& d) {

@@ -14,7 +14,8 @@ struct MaterialNode {
   Type type = Type::lobe;
   bool flip_invalid_normals = true, shadowed = true;  ///< maps
   bool needs_tangents = false, needs_uv = false;      ///< of all below
-  bool anisotropic = false;                           ///< a lobe below, maps or not, follows the tangent
+  bool anisotropic = false;                           ///< a lobe or map below follows the tangent
+  bool follows_tangent = false;                       ///< maps: what they nest is anisotropic
   bool tangent_frame = false;                         ///< a lobe below, not under a map, follows the tangent
   bool turns_to_wi = false;                           ///< every lobe below, not under a map, is twosided or null
   std::uint16_t model = 0;                            ///< lobe: index into CompiledMaterials::models
