@@ -1,0 +1,23 @@
+# cmake -DOUT=web_sources.cpp -DWEB=web "-DSCRIPTS=a.js,b.js" -P embed.cmake: the page's files as raw string literals, so that the binary
+# needs no file beside it. The delimiter must not occur in them.
+set(delimiter "~WEB~")
+function(literal NAME)
+  set(text "")
+  foreach(file IN LISTS ARGN)
+    file(READ "${WEB}/${file}" part)
+    string(FIND "${part}" ")${delimiter}\"" found)
+    if(NOT found EQUAL -1)
+      message(FATAL_ERROR "${WEB}/${file}: contains the delimiter of raw strings")
+    endif()
+    string(APPEND text "${part}")
+  endforeach()
+  file(APPEND "${OUT}.tmp" "const std::string_view ${NAME} = R\"${delimiter}(${text})${delimiter}\";\n")
+endfunction()
+
+string(REPLACE "," ";" SCRIPTS "${SCRIPTS}")
+file(WRITE "${OUT}.tmp" "#include \"report/web_sources.h\"\n\nnamespace warpath::web {\n\n")
+literal(kReportHtml report.html)
+literal(kStyle report.css)
+literal(kScript ${SCRIPTS})
+file(APPEND "${OUT}.tmp" "\n}  // namespace warpath::web\n")
+file(RENAME "${OUT}.tmp" "${OUT}")
