@@ -25,7 +25,7 @@ inline double to_unit_double(std::uint64_t bits) { return static_cast<double>(bi
 inline float sample_float(std::uint64_t key, std::uint32_t d) { return to_unit_float(sample_bits(key, d)); }
 inline double sample_double(std::uint64_t key, std::uint32_t d) { return to_unit_double(sample_bits(key, d)); }
 
-/// Uniform primary sample in double to the float that the tracer uses: rounded down, so it stays below 1.
+/// Primary sample in double to the float that the tracer uses: the nearest in [0,1).
 inline float to_primary(double y) {
   const float f = static_cast<float>(y);
   return f < 1.0f ? (f < 0.0f ? 0.0f : f) : 0x1.fffffep-1f;
