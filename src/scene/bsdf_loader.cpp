@@ -220,10 +220,11 @@ Model load_blendbsdf(LoadContext& context, const Object& object) {
   return BlendBsdf{nested[0], nested[1], reflectance(context, object, "weight")};
 }
 
-/// These change only how Mitsuba mends normals that point below the surface; ours are its defaults.
-void check_normal_mending(const Object& object) {
-  for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
-    if (!object.get_boolean(name, true)) fail(object.find(name)->where, "{}=\"false\" is not supported yet", name);
+/// How Mitsuba mends normals that face away from the ray, and the shadows that they make.
+template <class Map>
+void load_normal_mending(const Object& object, Map& map) {
+  map.flip_invalid_normals = object.get_boolean("flip_invalid_normals", true);
+  map.use_shadowing_function = object.get_boolean("use_shadowing_function", true);
 }
 
 Model load_bumpmap(LoadContext& context, const Object& object) {
@@ -232,7 +233,7 @@ Model load_bumpmap(LoadContext& context, const Object& object) {
   if (textures.size() != 1) fail(object.where, "\"bumpmap\" needs one texture in it, it has {}", textures.size());
   BumpMap b{nested, load_texture(context, *std::get<const Object*>(textures[0]->value), ColorRole::unbounded)};
   b.scale = object.get_float("scale", 1);
-  check_normal_mending(object);
+  load_normal_mending(object, b);
   return b;
 }
 
@@ -240,7 +241,7 @@ Model load_normalmap(LoadContext& context, const Object& object) {
   const BsdfId nested = load_nested(context, object, 1, 1)[0];
   if (!object.has("normalmap")) fail(object.where, "\"normalmap\" needs a <texture name=\"normalmap\">");
   NormalMap b{nested, get_texture(context, object, "normalmap", 0, ColorRole::unbounded)};
-  check_normal_mending(object);
+  load_normal_mending(object, b);
   return b;
 }
 

@@ -26,6 +26,41 @@ inline float erf_inverse(float x) {
   return p * x;
 }
 
+/// Slope towards wi of a normal that is visible from angle theta, with u in (0,1), for Beckmann's distribution of
+/// roughness 1. Newton's method on the distribution function, in the domain of erf: continuous in u, unlike the
+/// published inversion. The slope across is erf_inverse(2 u' - 1), whatever theta.
+inline float visible_slope_beckmann(float sin_theta, float cos_theta, float u) {
+  const float inv_sqrt_pi = 0.5641895835f, limit = 1 - 1e-6f;
+  const float tan_theta = sin_theta / std::fmax(cos_theta, 1e-6f);
+  const float cot_theta = tan_theta > 0 ? 1 / tan_theta : 1e10f;
+  const float max = std::erf(cot_theta);
+  float x = max - (max + 1) * std::erf(std::sqrt(-std::log(u)));  // the solution at grazing incidence
+  const float target = u * (1 + max + inv_sqrt_pi * tan_theta * std::exp(-cot_theta * cot_theta));
+  for (int i = 0; i < 3; ++i) {
+    x = std::clamp(x, -limit, limit);
+    const float slope = erf_inverse(x);
+    const float value = 1 + x + inv_sqrt_pi * tan_theta * std::exp(-slope * slope) - target;
+    const float derivative = 1 - slope * tan_theta;
+    if (!(derivative > 1e-10f)) break;
+    x -= value / derivative;
+  }
+  return erf_inverse(std::clamp(x, -limit, limit));
+}
+
+/// Slopes towards and across wi of a visible normal, for GGX of roughness 1; p is uniform in the unit disk: the half
+/// disk that wi sees from the side is squeezed by cos(theta). [Heitz 2018, Sampling the GGX Distribution of Visible
+/// Normals]
+inline Vec2 visible_slope_ggx(float sin_theta, float cos_theta, const Vec2& p) {
+  const float s = 0.5f * (1 + cos_theta), x2 = p.x * p.x;
+  const float y = std::sqrt(x2 < 1 ? 1 - x2 : 0) * (1 - s) + p.y * s;
+  const float z2 = 1 - x2 - y * y;
+  const float z = std::sqrt(z2 > 0 ? z2 : 0);
+  // A floor keeps slopes finite at the rim under grazing incidence.
+  const float cosine = sin_theta * y + cos_theta * z;
+  const float norm = 1 / (cosine > 1e-10f ? cosine : 1e-10f);
+  return {(cos_theta * y - sin_theta * z) * norm, p.x * norm};
+}
+
 /// Distribution of microfacet normals m around +z, with Smith's shadowing. Directions are local and unit.
 /// [Walter et al. 2007, Microfacet Models for Refraction; Heitz and d'Eon 2014, Importance Sampling Microfacet-Based
 /// BSDFs using the Distribution of Visible Normals; Heitz 2018 for GGX]
@@ -99,45 +134,18 @@ class Microfacet {
     const float sin_theta = std::sqrt(sqr(stretched.x) + sqr(stretched.y));
     const float cos_phi = sin_theta > 0 ? stretched.x / sin_theta : 1;
     const float sin_phi = sin_theta > 0 ? stretched.y / sin_theta : 0;
-    const Vec2 slope = m_type == MicrofacetType::ggx ? visible_slope_ggx(sin_theta, stretched.z, u)
-                                                     : visible_slope_beckmann(sin_theta, stretched.z, u);
+    Vec2 slope;
+    if (m_type == MicrofacetType::ggx) {
+      slope = visible_slope_ggx(sin_theta, stretched.z, square_to_disk(u));
+    } else {
+      // Away from 0 and 1, where slopes are infinite.
+      const float x = std::clamp(u.x, 1e-6f, 1 - 1e-6f), y = std::clamp(u.y, 1e-6f, 1 - 1e-6f);
+      slope = {visible_slope_beckmann(sin_theta, stretched.z, x), erf_inverse(2 * y - 1)};
+    }
     const float slope_u = (cos_phi * slope.x - sin_phi * slope.y) * m_alpha_u;
     const float slope_v = (sin_phi * slope.x + cos_phi * slope.y) * m_alpha_v;
     const float inv_length = 1 / std::sqrt(1 + slope_u * slope_u + slope_v * slope_v);
     return {-slope_u * inv_length, -slope_v * inv_length, inv_length};
-  }
-
-  static Vec2 visible_slope_ggx(float sin_theta, float cos_theta, const Vec2& u) {
-    // The half disk that wi sees from the side is squeezed by cos(theta). [Heitz 2018]
-    Vec2 p = square_to_disk(u);
-    const float s = 0.5f * (1 + cos_theta);
-    p.y = std::sqrt(std::fmax(0.0f, 1 - p.x * p.x)) * (1 - s) + p.y * s;
-    const float z = std::sqrt(std::fmax(0.0f, 1 - p.x * p.x - p.y * p.y));
-    // Its floor keeps slopes finite at the rim under grazing incidence.
-    const float norm = 1 / std::fmax(sin_theta * p.y + cos_theta * z, 1e-10f);
-    return {(cos_theta * p.y - sin_theta * z) * norm, p.x * norm};
-  }
-
-  static Vec2 visible_slope_beckmann(float sin_theta, float cos_theta, Vec2 u) {
-    // Newton's method on the distribution function, in the domain of erf: continuous, unlike the published inversion.
-    const float inv_sqrt_pi = 0.5641895835f;
-    u.x = std::clamp(u.x, 1e-6f, 1 - 1e-6f);
-    u.y = std::clamp(u.y, 1e-6f, 1 - 1e-6f);
-    const float tan_theta = sin_theta / std::fmax(cos_theta, 1e-6f);
-    const float cot_theta = tan_theta > 0 ? 1 / tan_theta : 1e10f;
-    const float max = std::erf(cot_theta);
-    float x = max - (max + 1) * std::erf(std::sqrt(-std::log(u.x)));  // the solution at grazing incidence
-    const float target = u.x * (1 + max + inv_sqrt_pi * tan_theta * std::exp(-cot_theta * cot_theta));
-    const float limit = 1 - 1e-6f;
-    for (int i = 0; i < 3; ++i) {
-      x = std::clamp(x, -limit, limit);
-      const float slope = erf_inverse(x);
-      const float value = 1 + x + inv_sqrt_pi * tan_theta * std::exp(-slope * slope) - target;
-      const float derivative = 1 - slope * tan_theta;
-      if (!(derivative > 1e-10f)) break;
-      x -= value / derivative;
-    }
-    return {erf_inverse(std::clamp(x, -limit, limit)), erf_inverse(2 * u.y - 1)};
   }
 
   MicrofacetType m_type;

@@ -29,7 +29,7 @@ struct RoughInterface {
   RoughTransmittance external_transmittance;
   float internal_reflectance;  ///< of diffuse light from within
 };
-/// Integrates the interface's rough reflection and refraction; takes some milliseconds. eta > 0, not 1.
+/// Integrates the reflection and refraction of a rough interface; takes some milliseconds. eta > 0, not 1.
 RoughInterface make_rough_interface(MicrofacetType distribution, float alpha, float eta);
 
 }  // namespace warpath
