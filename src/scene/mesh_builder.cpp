@@ -84,12 +84,13 @@ std::vector<Vec3> transformed_normals(std::vector<Vec3> normals, const Matrix4& 
   return normals;
 }
 
-/// Normals of groups of vertices (those of one position in the file).
+/// Vertex normals from the triangles around each vertex.
 std::vector<Vec3> smooth_normals(const std::vector<Vec3>& positions, const std::vector<std::uint32_t>& indices,
-                                 const std::vector<std::uint32_t>& group_of_vertex, std::size_t groups) {
-  std::vector<Vec3> sums(groups, Vec3(0.0f));
+                                 std::size_t vertices) {
+  std::vector<Vec3> sums(vertices, Vec3(0.0f));
   for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-    const Vec3 p[3] = {positions[indices[i]], positions[indices[i + 1]], positions[indices[i + 2]]};
+    const std::uint32_t* corner = &indices[i];
+    const Vec3 p[3] = {positions[corner[0]], positions[corner[1]], positions[corner[2]]};
     Vec3 n = (p[1] - p[0]).cross(p[2] - p[0]);
     const float length = std::sqrt(n.dot(n));
     if (!(length > 0) || !std::isfinite(length)) continue;
@@ -97,9 +98,7 @@ std::vector<Vec3> smooth_normals(const std::vector<Vec3>& positions, const std::
     for (int k = 0; k < 3; ++k) {
       const Vec3 a = p[(k + 1) % 3] - p[k], b = p[(k + 2) % 3] - p[k];
       const Vec3 cross = a.cross(b);
-      const float angle = std::atan2(std::sqrt(cross.dot(cross)), a.dot(b));
-      sums[group_of_vertex.empty() ? indices[i + static_cast<std::size_t>(k)]
-                                   : group_of_vertex[indices[i + static_cast<std::size_t>(k)]]] += n * angle;
+      sums[corner[k]] += n * std::atan2(std::sqrt(cross.dot(cross)), a.dot(b));
     }
   }
   for (Vec3& n : sums) {
@@ -111,15 +110,16 @@ std::vector<Vec3> smooth_normals(const std::vector<Vec3>& positions, const std::
 
 /// Computes the normals that the file lacks, all of them or some.
 void complete_normals(std::vector<Vec3>& normals, const std::vector<Vec3>& positions,
-                      const std::vector<std::uint32_t>& indices, const std::vector<std::uint32_t>& group_of_vertex,
-                      std::size_t groups) {
+                      const std::vector<std::uint32_t>& indices) {
   const std::size_t vertices = positions.size() - 1;
-  const bool none = normals.empty();
-  if (!none && std::find(normals.begin(), normals.end(), Vec3(0.0f)) == normals.end()) return;
-  const auto smooth = smooth_normals(positions, indices, group_of_vertex, groups);
-  normals.resize(vertices, Vec3(0.0f));
+  if (!normals.empty() && std::find(normals.begin(), normals.end(), Vec3(0.0f)) == normals.end()) return;
+  auto smooth = smooth_normals(positions, indices, vertices);
+  if (normals.empty()) {
+    normals = std::move(smooth);
+    return;
+  }
   for (std::size_t v = 0; v < vertices; ++v)
-    if (none || normals[v] == Vec3(0.0f)) normals[v] = smooth[group_of_vertex.empty() ? v : group_of_vertex[v]];
+    if (normals[v] == Vec3(0.0f)) normals[v] = smooth[v];
 }
 
 template <class T>
@@ -139,8 +139,6 @@ Mesh build_mesh(IndexedMesh&& source, const MeshPlacement& placement) {
   }
   Mesh mesh;
   std::vector<Vec3> positions, normals;
-  std::vector<std::uint32_t> group_of_vertex;  // empty: every vertex its own
-  std::size_t groups = source.positions.size();
   if (source.corner_normal.empty() && source.corner_uv.empty() && all_used(source)) {
     positions = std::move(source.positions);
     normals = std::move(source.normals);
@@ -152,12 +150,12 @@ Mesh build_mesh(IndexedMesh&& source, const MeshPlacement& placement) {
     if (!source.normals.empty()) normals = gather(source.normals, welded.normal);
     if (!source.uvs.empty()) mesh.uvs = gather(source.uvs, welded.uv);
     mesh.indices = std::move(welded.indices);
-    group_of_vertex = std::move(welded.position);
   }
   mesh.indices.shrink_to_fit();
   mesh.uvs.shrink_to_fit();
 
-  if ((determinant3(placement.to_world[0]) < 0) != placement.flip_normals)
+  const bool mirrored = determinant3(placement.to_world[0]) < 0;
+  if ((mirrored && !normals.empty()) != placement.flip_normals)
     for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) std::swap(mesh.indices[i], mesh.indices[i + 2]);
 
   const auto place = [&](int end, std::vector<Vec3> local, std::vector<Vec3> local_normals, std::vector<Vec3>& world,
@@ -165,7 +163,7 @@ Mesh build_mesh(IndexedMesh&& source, const MeshPlacement& placement) {
     world = transformed(std::move(local), placement.to_world[end]);
     if (placement.face_normals) return;
     world_normals = transformed_normals(std::move(local_normals), placement.to_world[end], placement.flip_normals);
-    complete_normals(world_normals, world, mesh.indices, group_of_vertex, groups);
+    complete_normals(world_normals, world, mesh.indices);
     world_normals.shrink_to_fit();
   };
   if (placement.moving) place(1, positions, normals, mesh.positions_end, mesh.normals_end);

@@ -11,11 +11,12 @@ struct MeshPlacement {
   bool face_normals = false;
 };
 
-/// A mesh in world space as Mitsuba 3 builds it: corners with the same position, normal and texture coordinates share
-/// a vertex; a mirroring transform or flip_normals (not both) reverses the triangles, and flip_normals negates the
-/// file's normals, so that Mesh::flip_normals stays false. Where the file has no normals they are computed per
-/// position, each triangle's weighted by its angle (Thuermer and Wuethrich, JGT 3(1), 1998), unless face_normals is
-/// set.
+/// A mesh in world space as Mitsuba 3.9 builds it: corners with the same indices share a vertex. Where the file has no
+/// normals they are computed per vertex, each triangle's weighted by its angle (Thuermer and Wuethrich, JGT 3(1),
+/// 1998), unless face_normals is set. flip_normals reverses the triangles and negates the normals, so that
+/// Mesh::flip_normals stays false. Under a mirroring transform normals of the file keep their side and the triangles
+/// follow them; without such normals the order of the corners alone says which side is in front, and the mirror turns
+/// it.
 Mesh build_mesh(IndexedMesh&& source, const MeshPlacement& placement);
 
 /// The cube [-1,1]^3 with texture coordinates and normals per side, as Mitsuba's.

@@ -81,7 +81,7 @@ struct Scene {
   Sensor sensor;
   FilmSettings film;
   IntegratorSettings integrator;
-  int sample_count = 16;  ///< spp in the file
+  int sample_count = 4;  ///< spp in the file, or Mitsuba's default
 };
 
 struct SceneOptions {

@@ -128,8 +128,8 @@ SerializedMesh read_version_5(Inflater& stream) {
   stream.check_count(name_length, 1);
   stream.read_array<char>(name_length);
   const auto vertices = stream.read<std::uint64_t>(), triangles = stream.read<std::uint64_t>();
-  const auto surface_points = stream.read<std::uint64_t>();
-  stream.read<std::uint64_t>();  // normal groups: only edits of a mesh need them
+  stream.read<std::uint64_t>();  // surface points and normal groups: only edits of a mesh need them
+  stream.read<std::uint64_t>();
   stream.check_count(vertices, 32);
   stream.check_count(triangles, 16);
   const auto records = stream.read_array<float>(8 * vertices);
@@ -149,22 +149,6 @@ SerializedMesh read_version_5(Inflater& stream) {
     result.mesh.corner_position.insert(result.mesh.corner_position.end(),
                                        {faces[4 * t], faces[4 * t + 1], faces[4 * t + 2]});
 
-  // Without stored normals they are computed per surface point, so corners are numbered by these.
-  if (surface_points == 0 || (flags & kV5HasNormals)) return result;
-  const auto point_of_vertex = stream.read_array<std::uint32_t>(vertices);
-  IndexedMesh by_point;
-  by_point.positions.resize(surface_points);
-  for (std::size_t v = 0; v < vertices; ++v) {
-    if (point_of_vertex[v] >= surface_points) stream.fail("vertex {} has no surface point", v);
-    by_point.positions[point_of_vertex[v]] = result.mesh.positions[v];
-  }
-  by_point.uvs = std::move(result.mesh.uvs);
-  for (const std::uint32_t vertex : result.mesh.corner_position) {
-    if (vertex >= vertices) stream.fail("a triangle refers to vertex {}, but there are {}", vertex, vertices);
-    by_point.corner_position.push_back(point_of_vertex[vertex]);
-  }
-  if (!by_point.uvs.empty()) by_point.corner_uv = std::move(result.mesh.corner_position);
-  result.mesh = std::move(by_point);
   return result;
 }
 

@@ -74,7 +74,7 @@ Geometry load_cylinder(LoadContext& context, const Object& object) {
                           length * n.z, 0, p0.x, p0.y, p0.z, 1);
   Cylinder cylinder;
   for (int i = 0; i < 2; ++i) cylinder.to_world[i] = to_single(local * Imath::M44d(motion.matrix[i]));
-  cylinder.flip_normals = object.get_boolean("flip_normals", false) != mirrors(cylinder.to_world[0]);
+  cylinder.flip_normals = object.get_boolean("flip_normals", false);
   return cylinder;
 }
 

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/log.h"
+
 namespace warpath {
 namespace {
 
@@ -69,6 +71,9 @@ M44d parse_operation(const XmlElement& element) {
     element.check_attributes({"value", "x", "y", "z", "angle"});
     const V3d axis = parse_xyz(element, 0);
     if (axis.length2() == 0) fail(element.where, "<rotate> needs an axis; write y=\"1\" for the y axis");
+    if (std::abs(axis.length() - 1) > 1e-3)
+      log::warn("{}: the axis of <rotate> is made a unit vector; Mitsuba 3 would distort the object",
+                to_string(element.where));
     m.setAxisAngle(axis, parse_number(element.required_attribute("angle"), element.where) * M_PI / 180);
   } else if (element.tag == "lookat" || element.tag == "lookAt") {
     element.check_attributes({"origin", "target", "up"});
