@@ -308,15 +308,18 @@ std::string check_differences(const Warp& warp, const CheckOptions& options) {
         z(i, d) = std::clamp(points(p, d), 2 * h, 1 - 2 * h) + (i == 1 + 2 * d ? -h : i == 2 + 2 * d ? h : 0.0);
     warp.forward(z.batch(), y.batch(), log_det);
     std::vector<double> central(dims * dims);
-    double scale = 0, kink = 0;
-    for (std::size_t d = 0; d < dims; ++d)
-      for (std::size_t j = 0; j < dims; ++j) {
+    double kink = 0;  // relative to what moves that coordinate of y most
+    for (std::size_t j = 0; j < dims; ++j) {
+      double scale = 0, bend = 0;
+      for (std::size_t d = 0; d < dims; ++d) {
         const double back = (y(0, j) - y(1 + 2 * d, j)) / h, ahead = (y(2 + 2 * d, j) - y(0, j)) / h;
         central[j * dims + d] = 0.5 * (back + ahead);
         scale = std::max(scale, std::fabs(central[j * dims + d]));
-        kink = std::max(kink, std::fabs(ahead - back));
+        bend = std::max(bend, std::fabs(ahead - back));
       }
-    if (kink > 100 * options.log_det_tolerance * scale) continue;
+      kink = std::max(kink, bend / scale);
+    }
+    if (!(kink <= options.kink)) continue;
     ++smooth;
     const double difference = std::fabs(log_abs_determinant(central, dims) - log_det[0]);
     worst = std::max(worst, std::isnan(difference) ? HUGE_VAL : difference);
@@ -341,8 +344,9 @@ std::string check_warp(const Warp& warp, const CheckOptions& options) {
   const auto dims = static_cast<std::size_t>(warp.dims());
   std::string problems;
   const std::size_t rows = std::min<std::size_t>(options.samples, 4096);
-  for (const Matrix<double>& start :
-       {uniform_rows(options.seed + 5, rows, dims), border_latents(dims, options.seed + 6)}) {
+  Matrix<double> border = border_latents(dims, options.seed + 6);
+  for (double& x : border.values()) x = std::min(x, 1 - options.border);
+  for (const Matrix<double>& start : {uniform_rows(options.seed + 5, rows, dims), border}) {
     Matrix<double> there(start.rows(), dims), back(start.rows(), dims);
     std::vector<double> log_there(start.rows()), log_back(start.rows());
     double worst_y = 0, worst_z = 0, worst_log = 0;

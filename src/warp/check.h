@@ -14,6 +14,8 @@ struct CheckOptions {
   double y_tolerance = 1e-5;        ///< of forward(inverse(y)); also of inverse(forward(z)), where z is not stretched
   double difference_step = 1e-6;    ///< in z, of the central differences that log_det is compared with
   double log_det_tolerance = 1e-4;  ///< against those differences
+  double kink = 1e-2;       ///< change of slope, relative, above which a point is not compared: a kink or a jump
+  double border = 0x1p-53;  ///< how near to 1 the numbers come that a bijection must bring back
 };
 
 /// What every proposal promises. Returns what is broken, with seeds and figures; empty if all holds, so that a test

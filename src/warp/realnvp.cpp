@@ -93,7 +93,7 @@ void RealNvp::save(TensorFile& file, const std::string& prefix) const {
   meta[prefix + "couplings"] = std::to_string(s.couplings);
   meta[prefix + "width"] = std::to_string(s.width);
   meta[prefix + "blocks"] = std::to_string(s.blocks);
-  meta[prefix + "shared"] = s.shared ? "1" : "0";
+  meta[prefix + "shared"] = std::to_string(s.shared ? 1 : 0);
   meta[prefix + "norm"] = kNorms[static_cast<std::size_t>(s.norm)];
   std::vector<float> values;
   for (const realnvp::ParameterView& view : m_flow.views()) {

@@ -61,8 +61,8 @@ class Flow {
   std::size_t training_scratch_count() const;
   /// The gradient of sum_i weight[i] * -ln(q(y_i)) over one block; with `uniform` > 0, of the density of the mixture
   /// (1 - uniform) q + uniform. y: dims x kBlock doubles; weight: kBlock, 0 for samples that only fill the block.
-  /// gradients: parameter_count(), layout as the parameters, gains folded in (see ResidualNet::unfold); it is added to
-  /// what is there if `accumulate`. Returns the loss.
+  /// gradients: parameter_count(), layout as the parameters, gains folded in (see ResidualNet::unfold), padding between
+  /// tensors untouched; it is added to what is there if `accumulate`. Returns the loss.
   double train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
                      bool accumulate, float* scratch) const;
 

@@ -9,7 +9,7 @@ namespace warpath::realnvp {
 // The flow lives in logit space: v = ln(z / (1 - z)). Couplings are affine for |v| <= kEdge and go on with slope 1
 // beyond it, so that densities stay finite at the border of the hypercube, where a scale would take them to 0 or
 // infinity. kEdge plays the part of the squeeze by 1e-7 in the code of [ZZ19]: logit(1e-7) = -16.1.
-inline constexpr float kEdge = 16.0f;
+inline constexpr float kEdge = 8.0f;
 
 /// v = logit of a row of numbers in [0,1), cut off at +-85. Error 2 ULP of float.
 void logit(const double* z, float* v);

@@ -1,0 +1,80 @@
+#pragma once
+#include <cmath>
+#include <vector>
+
+#include "nn/dense.h"
+#include "warp/realnvp_flow.h"
+#include "warp/realnvp_kernels.h"
+
+namespace warpath::realnvp {
+
+/// ln q(y) in plain loops and doubles, one sample at a time: what the kernels are tested against. [DSB17], [ZZ19]
+class Reference {
+ public:
+  Reference(const Flow& flow, std::vector<double> parameters) : m_flow(flow), p(std::move(parameters)) {}
+  std::vector<double>& parameters() { return p; }
+
+  double log_density(const std::vector<double>& y) const {
+    std::vector<double> v;
+    double log_q = 0;
+    for (const double x : y) v.push_back(std::log(x / (1 - x)));
+    for (const double x : v) log_q -= log_logistic(x);
+    for (std::size_t c = m_flow.couplings().size(); c-- > 0;) {
+      const Coupling& coupling = m_flow.couplings()[c];
+      std::vector<double> inputs, heads;
+      for (const int k : coupling.kept)
+        inputs.push_back(
+            std::clamp(v[static_cast<std::size_t>(k)], -static_cast<double>(kEdge), static_cast<double>(kEdge)));
+      for (std::size_t n = 0; n < coupling.nets.size(); ++n)
+        for (const double h : net(coupling.nets[n], coupling.parameters[n], inputs)) heads.push_back(h);
+      const std::size_t moved = coupling.moved.size();
+      for (std::size_t k = 0; k < moved; ++k) {
+        double& x = v[static_cast<std::size_t>(coupling.moved[k])];
+        const double s = p[coupling.scales + k] * std::tanh(heads[k]), edge = static_cast<double>(kEdge);
+        x -= heads[moved + k];
+        if (std::abs(x) <= edge * std::exp(s)) {
+          x *= std::exp(-s);
+          log_q -= s;
+        } else {
+          x -= std::copysign(edge, x) * (std::exp(s) - 1);
+        }
+      }
+    }
+    for (const double x : v) log_q += log_logistic(x);
+    return log_q;
+  }
+
+ private:
+  static double log_logistic(double v) { return -std::abs(v) - 2 * std::log1p(std::exp(-std::abs(v))); }
+
+  std::vector<double> layer(const nn::DenseLayer& l, std::size_t at, const std::vector<double>& x) const {
+    std::vector<double> y(static_cast<std::size_t>(l.outputs));
+    for (std::size_t o = 0; o < y.size(); ++o) {
+      double sum = 0;
+      for (std::size_t k = 0; k < x.size(); ++k)
+        sum += p[at + l.weight + o * static_cast<std::size_t>(nn::padded_inputs(l.inputs)) + k] * x[k];
+      y[o] = (l.normalised ? p[at + l.gain + o] : 1.0) * sum + p[at + l.bias + o];
+    }
+    return y;
+  }
+
+  std::vector<double> net(const nn::ResidualNet& net, std::size_t at, const std::vector<double>& x) const {
+    const auto relu = [](std::vector<double> v) {
+      for (double& e : v) e = std::max(e, 0.0);
+      return v;
+    };
+    const auto& l = net.layers();
+    std::vector<double> h = relu(layer(l[0], at, x));
+    for (std::size_t i = 1; i + 2 < l.size(); i += 2) {
+      std::vector<double> sum = layer(l[i + 1], at, relu(layer(l[i], at, h)));
+      for (std::size_t j = 0; j < h.size(); ++j) sum[j] += h[j];
+      h = relu(sum);
+    }
+    return layer(l.back(), at, h);
+  }
+
+  const Flow& m_flow;
+  std::vector<double> p;
+};
+
+}  // namespace warpath::realnvp
