@@ -77,7 +77,7 @@ struct Comparison {
   bool reference_has_variance = false;
   std::map<std::string, std::string> settings;  ///< whatever else shaped the result: max_depth, sampler, epp, ...
   std::vector<std::string> warnings;
-  std::vector<MethodRun> results;  ///< all runs of the first method, then of the second, ...
+  std::vector<MethodRun> results;  ///< in the order in which they ran
 };
 
 /// The text of `results.json`; bytes of names that are not UTF-8 become U+FFFD.

@@ -28,7 +28,7 @@ class Viewer {
     this.view = {x: width / 2, y: height / 2, zoom: 1};
     this.panels = entries.map((entry, index) => this.makePanel(entry, index));
     this.root = el('div', {class: 'viewer'}, this.makeToolbar(), this.legend = el('div', {class: 'legend'}),
-                   this.grid = el('div', {class: 'panels'}, this.panels.map((panel) => panel.figure)));
+                   this.grid = el('div', {class: 'panels', style: `--ratio:${width / height}`}, this.panels.map((panel) => panel.figure)));
     new ResizeObserver(() => this.draw()).observe(this.grid);
   }
 
@@ -121,7 +121,7 @@ class Viewer {
 
   makePanel(entry, index) {
     const canvas = el('canvas', {role: 'img', 'aria-label': `Rendered image: ${entry.name}`});
-    const stage = el('div', {class: 'stage', style: `aspect-ratio:${entry.image.width}/${entry.image.height}`}, canvas);
+    const stage = el('div', {class: 'stage'}, canvas);
     const value = el('span', {class: 'value'});
     const title = el('button', {class: 'title', onclick: () => this.select(index, !(this.single && this.selected === index)),
                                 title: 'Show this one alone, or all again'}, el('kbd', {}, entry.key), entry.label);
@@ -214,7 +214,7 @@ class Viewer {
   }
 
   refreshLegend(differing) {
-    if (!differing) return this.legend.replaceChildren();
+    if (!differing) return this.legend.replaceChildren('linear values × 2^EV, under the sRGB curve; magenta: not a number');
     const {table, unit} = kModes[this.mode], s = this.scale(), signed = this.mode === 'signed';
     const ticks = signed ? [[0, `−${formatNumber(s, 2)}`], [0.5, '0'], [1, `+${formatNumber(s, 2)}`]]
                          : [[0, '0'], [0.5, formatNumber(s / 2, 2)], [1, formatNumber(s, 2)]];
@@ -265,7 +265,7 @@ class Viewer {
     const context = canvas.getContext('2d'), s = (width / this.size.width) * this.view.zoom;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, width, height);
-    context.imageSmoothingEnabled = s < 1;
+    context.imageSmoothingEnabled = s < 1;  // pixels are shown as such, unless there are fewer on the screen
     context.setTransform(s, 0, 0, s, width / 2 - this.view.x * s, height / 2 - this.view.y * s);
     context.drawImage(panel.toned, 0, 0);
     this.drawHover(panel, context, ratio / s);
