@@ -23,6 +23,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,6 +100,11 @@ def read_exr(path, layer=None):
     return None
 
 
+def first_seed(scene, options):
+    """Another one for each scene, so that chance does not strike similar scenes alike."""
+    return options.seed + zlib.crc32("/".join(scene.parts[-2:]).encode()) % 1_000_000_000
+
+
 def render_with_warpath(scene, options, defines):
     """An estimate from independent runs of the command line."""
     images = []
@@ -106,7 +112,7 @@ def render_with_warpath(scene, options, defines):
         output = Path(folder) / "image.exr"
         for run in range(options.runs):
             command = [options.warpath, "render", str(scene), "--warp", "none", "--spp", str(max(1, options.spp // options.runs))]
-            command += ["--seed", str(options.seed + run), "--quiet", "-o", str(output)]
+            command += ["--seed", str(first_seed(scene, options) + run), "--quiet", "-o", str(output)]
             for name, value in defines.items():
                 command += ["-D", f"{name}={value}"]
             if options.max_depth:
@@ -125,7 +131,7 @@ def render_with_mitsuba(scene, options, defines):
     loaded = mi.load_file(str(scene), **defines)
     spp = max(1, options.spp // options.passes)
     return estimate_from_passes(
-        [np.array(mi.render(loaded, spp=spp, seed=options.seed + 1000 + i), dtype=np.float64)[..., :3]
+        [np.array(mi.render(loaded, spp=spp, seed=first_seed(scene, options) + 1000 + i), dtype=np.float64)[..., :3]
          for i in range(options.passes)])  # fmt: skip
 
 
