@@ -50,6 +50,12 @@ LobeEval eval(const Scatter& scatter, const ScatterLobe& lobe, const Vec3& wo) {
 
 const ScatterLobe* lobes_end(const Scatter& scatter) { return scatter.lobes.data() + scatter.lobe_count; }
 
+/// The commonest BSDF, which needs no more of its frame than the normal.
+bool is_plain_diffuse(const Scatter& scatter) {
+  const ScatterLobe& l = scatter.lobes[0];
+  return scatter.lobe_count == 1 && l.frame == 0 && scatter.models[l.model].type == LobeType::diffuse;
+}
+
 bool is_delta(LobeType t) {
   return t == LobeType::conductor || t == LobeType::dielectric || t == LobeType::thin_dielectric || t == LobeType::null;
 }
@@ -57,6 +63,14 @@ bool is_delta(LobeType t) {
 }  // namespace
 
 Color eval_pdf_bsdf(const Scatter& scatter, const Vec3& wo, float& pdf) {
+  if (is_plain_diffuse(scatter)) {
+    const float side = scatter.lobes[0].mirrored ? -1.0f : 1.0f;
+    const LobeEval e =
+        eval_diffuse(load_values<DiffuseValues>(scatter.values.data()), {0, 0, side * scatter.wi.dot(scatter.frame.n)},
+                     {0, 0, side * wo.dot(scatter.frame.n)});
+    pdf = e.pdf;
+    return e.value;
+  }
   LobeEval sum;
   for (const ScatterLobe* l = scatter.lobes.data(); l != lobes_end(scatter); ++l) {
     const LobeEval e = eval(scatter, *l, wo);

@@ -16,7 +16,7 @@ LobeSample sample_conductor(const LobeModel& m, const ConductorValues& v, const 
 
 LobeEval eval_rough_conductor(const LobeModel& m, const RoughConductorValues& v, const Vec3& wi, const Vec3& wo) {
   if (!(wi.z > 0 && wo.z > 0)) return {};
-  const Vec3 h = (wi + wo).normalized();
+  const Vec3 h = unit(wi + wo);
   const float cos_h = wi.dot(h);
   if (!(cos_h > 0)) return {};
   const Microfacet distribution(m.distribution, v.alpha_u, v.alpha_v, m.sample_visible);

@@ -98,7 +98,7 @@ LobeSample sample_rough_dielectric(const LobeModel& m, const RoughDielectricValu
   const float wi_h = wi.dot(h);
   const FresnelDielectric f = fresnel_dielectric(wi_h, m.eta);
   const bool reflect = u < f.reflectance;
-  const Vec3 wo = (reflect ? reflect_about(wi, h) : refract_about(wi, h, f)).normalized();
+  const Vec3 wo = unit(reflect ? reflect_about(wi, h) : refract_about(wi, h, f));
   const float wo_h = wo.dot(h);
   if (!(wi_h * wi.z > 0 && wo_h * wo.z > 0) || (wo.z * wi.z > 0) != reflect) return s;
 

@@ -59,7 +59,7 @@ LobeEval eval_rough_plastic(const LobeModel& m, const PlasticValues& v, const Ve
   const float cosine = cosine_hemisphere_pdf(wo.z);
   LobeEval e{base_reflectance(m, v.diffuse) * (cosine * t_i * t_o), (1 - specular) * cosine};
 
-  const Vec3 h = (wi + wo).normalized();
+  const Vec3 h = unit(wi + wo);
   const float cos_h = wi.dot(h);
   if (!(cos_h > 0)) return e;
   const Microfacet distribution(m.distribution, m.alpha, m.alpha, m.sample_visible);

@@ -189,7 +189,7 @@ LobeSample sample_principled(const LobeModel& m, const PrincipledValues& v, cons
     const Vec3 h = setup.distribution.sample(setup.front ? wi : -wi, dir);
     const FresnelDielectric f = fresnel_dielectric(wi.dot(h), m.eta);
     if (u < setup.diffuse + setup.clearcoat + setup.specular * setup.refracted(f.reflectance)) {
-      s.wo = refract_about(wi, h, f).normalized();
+      s.wo = unit(refract_about(wi, h, f));
       if (!(s.wo.z * wi.z < 0)) return s;
       s.eta = f.eta_it;
     } else {

@@ -36,21 +36,25 @@ inline FresnelDielectric fresnel_dielectric(float cos_theta_i, float eta) {
 
 /// Unpolarised Fresnel reflectance of a conductor with complex index eta + i k, for cos_theta_i >= 0. [K. D. Moeller,
 /// Optics, 1988]
-inline float fresnel_conductor(float cos_theta_i, float eta, float k) {
-  const float cos2 = cos_theta_i * cos_theta_i, sin2 = 1 - cos2;
-  const float d = eta * eta - k * k - sin2;
-  const float a2_b2 = std::sqrt(std::fmax(0.0f, d * d + 4 * eta * eta * k * k));
-  const float a = std::sqrt(std::fmax(0.0f, 0.5f * (a2_b2 + d)));
-  const float t1 = a2_b2 + cos2, t2 = 2 * cos_theta_i * a;
-  // Nothing but zeros is left at grazing incidence on an index of 1: all light is reflected.
-  const float r_s = t1 + t2 > 0 ? (t1 - t2) / (t1 + t2) : 1;
-  const float t3 = a2_b2 * cos2 + sin2 * sin2, t4 = t2 * sin2;
-  const float r_p = t3 + t4 > 0 ? r_s * (t3 - t4) / (t3 + t4) : r_s;
-  return 0.5f * (r_s + r_p);
-}
 inline Color fresnel_conductor(float cos_theta_i, const Color& eta, const Color& k) {
-  return {fresnel_conductor(cos_theta_i, eta.x, k.x), fresnel_conductor(cos_theta_i, eta.y, k.y),
-          fresnel_conductor(cos_theta_i, eta.z, k.z)};
+  const float cos2 = cos_theta_i * cos_theta_i, sin2 = 1 - cos2;
+  // Four channels without branches, the last one spare: SIMD of one vector.
+  const float eta4[4]{eta.x, eta.y, eta.z, eta.z}, k4[4]{k.x, k.y, k.z, k.z};
+  float f[4];
+  for (int c = 0; c < 4; ++c) {
+    const float eta2 = eta4[c] * eta4[c], k2 = k4[c] * k4[c];
+    const float d = eta2 - k2 - sin2;
+    const float a2_b2 = std::sqrt(d * d + 4 * eta2 * k2);
+    const float a2 = 0.5f * (a2_b2 + d);
+    const float t2 = 2 * cos_theta_i * std::sqrt(a2 > 0 ? a2 : 0);
+    const float t1 = a2_b2 + cos2, t3 = a2_b2 * cos2 + sin2 * sin2, t4 = t2 * sin2;
+    // Nothing but zeros is left at grazing incidence on an index of 1: all light is reflected, of both polarisations.
+    const float tiny = 1e-30f;
+    const float r_s = (t1 - t2 + tiny) / (t1 + t2 + tiny);
+    const float r_p = r_s * ((t3 - t4 + tiny) / (t3 + t4 + tiny));
+    f[c] = 0.5f * (r_s + r_p);
+  }
+  return {f[0], f[1], f[2]};
 }
 
 /// Fresnel reflectance under diffuse light from the side on which eta is the far index. Relative error below 1 %.
@@ -61,6 +65,8 @@ inline float fresnel_diffuse_reflectance(float eta) {
   return 0.919317f + inv * (-3.4793f + inv * (6.75335f + inv * (-7.80989f + inv * (4.98554f - 1.36881f * inv))));
 }
 
+/// v / |v|; v must not be 0. Imath's own is slow, since it minds vectors whose square underflows.
+inline Vec3 unit(const Vec3& v) { return v * (1 / std::sqrt(v.dot(v))); }
 inline Vec3 reflect_local(const Vec3& wi) { return {-wi.x, -wi.y, wi.z}; }
 inline Vec3 reflect_about(const Vec3& wi, const Vec3& m) { return m * (2 * wi.dot(m)) - wi; }
 inline Vec3 refract_local(const Vec3& wi, const FresnelDielectric& f) {

@@ -80,11 +80,16 @@ class Microfacet {
 
   /// Density D(m): its integral times cos(theta_m) is 1.
   float eval(const Vec3& m) const {
-    const float slope2 = sqr(m.x / m_alpha_u) + sqr(m.y / m_alpha_v);
-    const float cos2 = m.z * m.z;
-    const float scale = kPi * m_alpha_u * m_alpha_v;
-    const float d = m_type == MicrofacetType::beckmann ? std::exp(-slope2 / cos2) / (scale * cos2 * cos2)
-                                                       : 1 / (scale * sqr(slope2 + cos2));
+    float d;
+    if (m_type == MicrofacetType::ggx) {
+      // 1 / (pi au av ((x / au)^2 + (y / av)^2 + z^2)^2), with one division.
+      const float area = m_alpha_u * m_alpha_v;
+      const float sum = sqr(m.x * m_alpha_v) + sqr(m.y * m_alpha_u) + sqr(m.z * area);
+      d = area * area * area / (kPi * sum * sum);
+    } else {
+      const float cos2 = m.z * m.z;
+      d = std::exp(-(sqr(m.x / m_alpha_u) + sqr(m.y / m_alpha_v)) / cos2) / (kPi * m_alpha_u * m_alpha_v * cos2 * cos2);
+    }
     return d * m.z > 1e-20f ? d : 0;
   }
 
@@ -130,17 +135,18 @@ class Microfacet {
 
   Vec3 visible(const Vec3& wi, const Vec2& u) const {
     // Stretched so that the roughness is 1, sampled there as if wi had no azimuth, turned and squeezed back.
-    const Vec3 stretched = Vec3(m_alpha_u * wi.x, m_alpha_v * wi.y, wi.z).normalized();
-    const float sin_theta = std::sqrt(sqr(stretched.x) + sqr(stretched.y));
-    const float cos_phi = sin_theta > 0 ? stretched.x / sin_theta : 1;
-    const float sin_phi = sin_theta > 0 ? stretched.y / sin_theta : 0;
+    const float x = m_alpha_u * wi.x, y = m_alpha_v * wi.y;
+    const float xy2 = x * x + y * y;
+    const float inv_xy = 1 / std::sqrt(std::fmax(xy2, 1e-38f)), inv_all = 1 / std::sqrt(xy2 + wi.z * wi.z);
+    const float cos_phi = xy2 > 1e-38f ? x * inv_xy : 1, sin_phi = xy2 > 1e-38f ? y * inv_xy : 0;
+    const float sin_theta = xy2 * inv_xy * inv_all, cos_theta = wi.z * inv_all;
     Vec2 slope;
     if (m_type == MicrofacetType::ggx) {
-      slope = visible_slope_ggx(sin_theta, stretched.z, square_to_disk(u));
+      slope = visible_slope_ggx(sin_theta, cos_theta, square_to_disk(u));
     } else {
       // Away from 0 and 1, where slopes are infinite.
-      const float x = std::clamp(u.x, 1e-6f, 1 - 1e-6f), y = std::clamp(u.y, 1e-6f, 1 - 1e-6f);
-      slope = {visible_slope_beckmann(sin_theta, stretched.z, x), erf_inverse(2 * y - 1)};
+      const Vec2 inner(std::clamp(u.x, 1e-6f, 1 - 1e-6f), std::clamp(u.y, 1e-6f, 1 - 1e-6f));
+      slope = {visible_slope_beckmann(sin_theta, cos_theta, inner.x), erf_inverse(2 * inner.y - 1)};
     }
     const float slope_u = (cos_phi * slope.x - sin_phi * slope.y) * m_alpha_u;
     const float slope_v = (sin_phi * slope.x + cos_phi * slope.y) * m_alpha_v;
