@@ -1,20 +1,16 @@
 #include "train/fit_realnvp.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <vector>
 
-#include "core/floating_point.h"
 #include "core/interrupt.h"
 #include "core/rng.h"
 #include "nn/actnorm.h"
-#include "nn/adam.h"
+#include "train/fit_realnvp_optimiser.h"
 #include "warp/realnvp.h"
 #include "warp/realnvp_kernels.h"
 #include "warpath/error.h"
@@ -36,20 +32,7 @@ namespace {
 using nn::kBlock;
 using Floats = nn::AlignedVector<float>;
 using Doubles = nn::AlignedVector<double>;
-
-/// A batch's blocks are dealt out to this many gradients, which are then added in their order: so the sum does not
-/// depend on threads. More would cost memory traffic, fewer would leave threads idle.
-constexpr std::size_t kSlots = 8;
-
-void parallel(std::size_t count, const auto& body) {
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, count, 1),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        const FlushDenormals flush;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-      },
-      tbb::simple_partitioner());
-}
+using realnvp::parallel;
 
 /// Indices of examples in an order of its own for every epoch, by Fisher and Yates's shuffle.
 class Shuffle {
@@ -72,37 +55,15 @@ class Shuffle {
   std::size_t m_next;
 };
 
-/// Examples as blocks of dims x kBlock doubles; what is left of the last block weighs nothing.
-struct Blocks {
-  std::size_t count = 0, dims = 0;
-  Doubles y;
-  Floats weight;
-
-  void resize(std::size_t examples, std::size_t dimensions) {
-    count = (examples + kBlock - 1) / kBlock;
-    dims = dimensions;
-    y.assign(count * dims * kBlock, 0.5);
-    weight.assign(count * kBlock, 0.0f);
-  }
-  void set(std::size_t i, std::span<const float> example, float w) {
-    const std::size_t block = i / kBlock, lane = i % kBlock;
-    for (std::size_t d = 0; d < dims; ++d) y[(block * dims + d) * kBlock + lane] = static_cast<double>(example[d]);
-    weight[i] = w;
-  }
-  const double* block_y(std::size_t b) const { return y.data() + b * dims * kBlock; }
-  const float* block_weight(std::size_t b) const { return weight.data() + b * kBlock; }
-};
-
 class Trainer {
  public:
   Trainer(const Examples& examples, const RealNvpSettings& settings, std::uint64_t seed, const Proposal* init);
   Fit run();
 
  private:
-  void start_from(const Proposal& init);
-  void initialise_norms();
+  Floats start_from(const Proposal& init) const;
+  void initialise_norms(Floats& parameters) const;
   void next_batch();
-  double step();  ///< one step of Adam; the batch's loss
   double held_out_loss(const Floats& parameters);
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - m_start).count(); }
 
@@ -112,14 +73,10 @@ class Trainer {
   realnvp::Flow m_flow;
   std::chrono::steady_clock::time_point m_start = std::chrono::steady_clock::now();
 
-  Floats m_parameters, m_average, m_best, m_gradients, m_m, m_v;
-  realnvp::Packed m_packed;
-  std::vector<Floats> m_scratch;  ///< one for each slot
-  Blocks m_batch, m_held_out;
+  std::optional<realnvp::Optimiser> m_optimiser;
+  realnvp::ExampleBlocks m_batch, m_held_out;
   double m_mean_weight = 0, m_held_out_weight = 0;
   std::optional<Shuffle> m_shuffle;
-  nn::Adam m_adam;
-  int m_step = 0;
 };
 
 Trainer::Trainer(const Examples& examples, const RealNvpSettings& settings, std::uint64_t seed, const Proposal* init)
@@ -154,21 +111,12 @@ Trainer::Trainer(const Examples& examples, const RealNvpSettings& settings, std:
 
   m_batch.resize(static_cast<std::size_t>(settings.batch), dims);
   next_batch();
-  if (init)
-    start_from(*init);
-  else {
-    m_parameters = m_flow.initial(mix64(seed + 2));
-    if (settings.norm == RealNvpSettings::Norm::actnorm) initialise_norms();
-  }
-  m_average = m_best = m_parameters;
-  m_m.assign(m_parameters.size(), 0.0f);
-  m_v = m_m;
-  m_gradients.assign(kSlots * m_parameters.size(), 0.0f);
-  m_scratch.assign(kSlots, Floats(m_flow.training_scratch_count()));
-  m_flow.pack(m_parameters.data(), m_packed, true);
+  Floats parameters = init ? start_from(*init) : m_flow.initial(mix64(seed + 2));
+  if (!init && settings.norm == RealNvpSettings::Norm::actnorm) initialise_norms(parameters);
+  m_optimiser.emplace(m_flow, std::move(parameters), settings.average);
 }
 
-void Trainer::start_from(const Proposal& init) {
+Floats Trainer::start_from(const Proposal& init) const {
   const auto* warp = dynamic_cast<const RealNvp*>(&init);
   if (!warp) throw ConfigError(fmt::format("a {} cannot start the training of a realnvp", init.family()));
   const RealNvpSettings &a = warp->settings(), &b = m_settings;
@@ -179,11 +127,11 @@ void Trainer::start_from(const Proposal& init) {
   if (text(a, warp->dims()) != text(b, m_flow.dims()))
     throw ConfigError(fmt::format("the weights to start from are of a Real NVP of {}; this one has {}",
                                   text(a, warp->dims()), text(b, m_flow.dims())));
-  m_parameters = warp->parameters();
+  return warp->parameters();
 }
 
 // Every coupling is the identity at the start, so that all of them see the examples themselves.
-void Trainer::initialise_norms() {
+void Trainer::initialise_norms(Floats& parameters) const {
   const std::size_t blocks = m_batch.count;
   Floats v(blocks * m_batch.dims * kBlock);
   for (std::size_t i = 0; i < blocks * m_batch.dims; ++i)
@@ -198,7 +146,7 @@ void Trainer::initialise_norms() {
                         x.data() + (b * kept + k) * kBlock);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
       nn::initialise_actnorm(coupling.nets[n], static_cast<int>(blocks), x.data(),
-                             m_parameters.data() + coupling.parameters[n]);
+                             parameters.data() + coupling.parameters[n]);
   });
 }
 
@@ -209,36 +157,6 @@ void Trainer::next_batch() {
     const double weight = m_examples.weight.empty() ? 1.0 : static_cast<double>(m_examples.weight[e]);
     m_batch.set(i, m_examples.y.batch().row(e), static_cast<float>(weight * scale));
   }
-}
-
-double Trainer::step() {
-  const std::size_t stride = m_parameters.size(), slots = std::min(kSlots, m_batch.count);
-  std::array<double, kSlots> loss{};
-  parallel(slots, [&](std::size_t slot) {
-    const std::size_t first = slot * m_batch.count / slots, end = (slot + 1) * m_batch.count / slots;
-    for (std::size_t b = first; b < end; ++b)
-      loss[slot] += m_flow.train_block(m_packed, m_batch.block_y(b), m_batch.block_weight(b), m_settings.uniform,
-                                       m_gradients.data() + slot * stride, b > first, m_scratch[slot].data());
-  });
-  ++m_step;
-  const float keep = static_cast<float>(std::min(m_settings.average, m_step / (m_step + 10.0)));
-  const auto update = [&](std::size_t from, std::size_t count) {
-    nn::adam_step(m_adam, m_step, count, m_gradients.data() + from, m_parameters.data() + from, m_m.data() + from,
-                  m_v.data() + from);
-    nn::move_average(1 - keep, count, m_parameters.data() + from, m_average.data() + from);
-  };
-  parallel(m_flow.couplings().size(), [&](std::size_t c) {
-    const realnvp::Coupling& coupling = m_flow.couplings()[c];
-    const std::size_t from = coupling.parameters.front();
-    const std::size_t end = c + 1 < m_flow.couplings().size() ? m_flow.couplings()[c + 1].parameters.front() : stride;
-    nn::add_slots(static_cast<int>(slots), stride, end - from, m_gradients.data() + from);
-    for (std::size_t n = 0; n < coupling.nets.size(); ++n)
-      coupling.nets[n].unfold(m_parameters.data() + coupling.parameters[n],
-                              m_gradients.data() + coupling.parameters[n]);
-    update(from, end - from);
-    m_flow.pack_coupling(c, m_parameters.data(), m_packed);
-  });
-  return std::accumulate(loss.begin(), loss.end(), 0.0);
 }
 
 double Trainer::held_out_loss(const Floats& parameters) {
@@ -267,9 +185,9 @@ double Trainer::held_out_loss(const Floats& parameters) {
 
 Fit Trainer::run() {
   Fit fit;
-  double best = held_out_loss(m_parameters), since = 0;
+  Floats best_parameters = m_optimiser->parameters();
+  double best = held_out_loss(best_parameters), since = 0, rate = m_settings.rate;
   int bad = 0, drops = 0, losses = 0;
-  m_adam.rate = static_cast<float>(m_settings.rate);
   fit.log.points.push_back({seconds(), 0, best, best});
   fit.log.stopped = "max_steps";
   for (int s = 1; s <= m_settings.max_steps; ++s) {
@@ -279,28 +197,28 @@ Fit Trainer::run() {
       break;
     }
     if (s > 1) next_batch();
-    since += step();
+    since += m_optimiser->step(m_batch, rate);
     ++losses;
     if (s % m_settings.evaluate_every != 0 && s != m_settings.max_steps) continue;
-    const double held_out = held_out_loss(m_average);
+    const double held_out = held_out_loss(m_optimiser->averaged());
     fit.log.points.push_back({seconds(), static_cast<std::uint64_t>(s) * static_cast<std::uint64_t>(m_settings.batch),
                               since / losses, held_out});
     since = losses = 0;
     if (held_out < best) {
       best = held_out;
       bad = 0;
-      m_best = m_average;
+      best_parameters = m_optimiser->averaged();
     } else if (++bad >= m_settings.patience) {
       if (drops++ >= m_settings.rate_drops) {
         fit.log.stopped = "held-out likelihood no longer rises";
         break;
       }
-      m_adam.rate /= 3;
+      rate /= 3;
       bad = 0;
     }
   }
   fit.log.seconds = seconds();
-  fit.proposal = std::make_shared<RealNvp>(std::move(m_flow), std::move(m_best));
+  fit.proposal = std::make_shared<RealNvp>(m_flow, std::move(best_parameters));
   return fit;
 }
 

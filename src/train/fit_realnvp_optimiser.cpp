@@ -1,0 +1,77 @@
+#include "train/fit_realnvp_optimiser.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace warpath::realnvp {
+namespace {
+
+using nn::kBlock;
+
+/// A batch's blocks are dealt out to this many gradients, which are then added in their order: so the sum does not
+/// depend on threads. More would cost memory traffic, fewer would leave threads idle.
+constexpr std::size_t kSlots = 8;
+
+}  // namespace
+
+void ExampleBlocks::resize(std::size_t examples, std::size_t dimensions) {
+  count = (examples + kBlock - 1) / kBlock;
+  dims = dimensions;
+  y.assign(count * dims * kBlock, 0.5);
+  weight.assign(count * kBlock, 0.0f);
+}
+
+void ExampleBlocks::set(std::size_t i, std::span<const float> example, float w) {
+  const std::size_t block = i / kBlock, lane = i % kBlock;
+  for (std::size_t d = 0; d < dims; ++d) y[(block * dims + d) * kBlock + lane] = static_cast<double>(example[d]);
+  weight[i] = w;
+}
+
+Optimiser::Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average)
+    : m_flow(flow),
+      m_decay(average),
+      m_parameters(std::move(parameters)),
+      m_average(m_parameters),
+      m_gradients(kSlots * m_parameters.size(), 0.0f),
+      m_m(m_parameters.size(), 0.0f),
+      m_v(m_m),
+      m_scratch(kSlots, nn::AlignedVector<float>(flow.training_scratch_count())) {
+  m_flow.pack(m_parameters.data(), m_packed, true);
+}
+
+double Optimiser::step(const ExampleBlocks& batch, double rate) {
+  const std::size_t slots = std::min(kSlots, batch.count);
+  std::array<double, kSlots> loss{};
+  parallel(slots, [&](std::size_t slot) {
+    const std::size_t first = slot * batch.count / slots, end = (slot + 1) * batch.count / slots;
+    for (std::size_t b = first; b < end; ++b)
+      loss[slot] +=
+          m_flow.train_block(m_packed, batch.block_y(b), batch.block_weight(b), m_flow.settings().uniform,
+                             m_gradients.data() + slot * m_parameters.size(), b > first, m_scratch[slot].data());
+  });
+  ++m_step;
+  const nn::Adam adam{.rate = static_cast<float>(rate)};
+  parallel(m_flow.couplings().size(), [&](std::size_t c) { update(c, slots, adam); });
+  return std::accumulate(loss.begin(), loss.end(), 0.0);
+}
+
+// One coupling's share of everything that follows the gradient, while its numbers are in the cache.
+void Optimiser::update(std::size_t c, std::size_t slots, const nn::Adam& adam) {
+  const auto& couplings = m_flow.couplings();
+  const std::size_t from = couplings[c].parameters.front();
+  const std::size_t end = c + 1 < couplings.size() ? couplings[c + 1].parameters.front() : m_parameters.size();
+  const std::size_t count = end - from;
+  nn::add_slots(static_cast<int>(slots), m_parameters.size(), count, m_gradients.data() + from);
+  for (std::size_t n = 0; n < couplings[c].nets.size(); ++n)
+    couplings[c].nets[n].unfold(m_parameters.data() + couplings[c].parameters[n],
+                                m_gradients.data() + couplings[c].parameters[n]);
+  nn::adam_step(adam, m_step, count, m_gradients.data() + from, m_parameters.data() + from, m_m.data() + from,
+                m_v.data() + from);
+  // Young averages forget faster, so that the start has no part in them.
+  const double decay = std::min(m_decay, m_step / (m_step + 10.0));
+  nn::move_average(static_cast<float>(1 - decay), count, m_parameters.data() + from, m_average.data() + from);
+  m_flow.pack_coupling(c, m_parameters.data(), m_packed);
+}
+
+}  // namespace warpath::realnvp

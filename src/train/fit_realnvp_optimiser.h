@@ -1,0 +1,61 @@
+#pragma once
+#include <oneapi/tbb/parallel_for.h>
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/floating_point.h"
+#include "nn/adam.h"
+#include "warp/realnvp_flow.h"
+
+namespace warpath::realnvp {
+
+/// Weighted examples as blocks of dims x nn::kBlock doubles; what is left of the last block weighs nothing.
+struct ExampleBlocks {
+  std::size_t count = 0, dims = 0;
+  nn::AlignedVector<double> y;
+  nn::AlignedVector<float> weight;
+
+  void resize(std::size_t examples, std::size_t dimensions);
+  void set(std::size_t i, std::span<const float> example, float w);
+  const double* block_y(std::size_t b) const { return y.data() + b * dims * nn::kBlock; }
+  const float* block_weight(std::size_t b) const { return weight.data() + b * nn::kBlock; }
+};
+
+/// body(i) for i in [0, count), on all threads, one i at a time, denormals flushed.
+void parallel(std::size_t count, const auto& body) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, count, 1),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        const FlushDenormals flush;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+      },
+      tbb::simple_partitioner());
+}
+
+/// Parameters of a flow on their way down the gradient. All sums have a fixed order: threads change no bit.
+class Optimiser {
+ public:
+  /// `average`: decay per step of the moving average of the parameters.
+  Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average);
+
+  /// One step of Adam on the loss sum_i weight[i] * -ln(q(y_i)), see Flow::train_block. Returns the loss before it.
+  double step(const ExampleBlocks& batch, double rate);
+
+  const nn::AlignedVector<float>& parameters() const { return m_parameters; }
+  const nn::AlignedVector<float>& averaged() const { return m_average; }
+  int steps() const { return m_step; }
+
+ private:
+  void update(std::size_t coupling, std::size_t slots, const nn::Adam& adam);
+
+  const Flow& m_flow;
+  double m_decay;
+  int m_step = 0;
+  nn::AlignedVector<float> m_parameters, m_average, m_gradients, m_m, m_v;
+  Packed m_packed;
+  std::vector<nn::AlignedVector<float>> m_scratch;  ///< one for each slot
+};
+
+}  // namespace warpath::realnvp
