@@ -57,17 +57,18 @@ function notices(data) {
   return texts.length ? el('ul', {class: 'notices', role: 'note'}, texts.map((text) => el('li', {}, text))) : null;
 }
 
+const gainGrade = ({value}) => (value > 1.02 ? 'better' : value < 0.98 ? 'worse' : '');
+
 /** one card for each method beside the baseline: what it gained */
 function gainCards(data) {
   const {methods, baseline, has_errors: hasErrors} = data.summary;
   if (!hasErrors || methods.length < 2) return null;
   const card = (m) => {
-    const value = m.gain_mse.value, grade = !known(value) ? '' : value > 1.02 ? 'better' : value < 0.98 ? 'worse' : '';
-    return el('article', {class: `card ${grade}`}, methodLabel(m.method, methodIndex(data, m.method)),
-              el('p', {class: 'big'}, m.gain_mse.text, el('span', {class: 'times'}, ' ×'), m.gain_mse.error && el('span', {class: 'spread'}, ` ± ${m.gain_mse.error}`)),
+    const smaller = (name, gain) => [el('dt', {}, name), el('dd', {class: gainGrade(gain)}, estimate(gain), known(gain.value) && ' ×')];
+    return el('article', {class: 'card'}, methodLabel(m.method, methodIndex(data, m.method)),
+              el('p', {class: `big ${gainGrade(m.gain_mse)}`}, m.gain_mse.text, el('span', {class: 'times'}, ' ×'), m.gain_mse.error && el('span', {class: 'spread'}, ` ± ${m.gain_mse.error}`)),
               el('p', {class: 'what'}, 'gain in MSE over ', el('code', {}, methods[baseline].method)),
-              el('dl', {}, el('dt', {}, 'relMSE'), el('dd', {}, estimate(m.gain_relmse), known(m.gain_relmse.value) && ' ×'), el('dt', {}, 'MSE at equal time*'),
-                 el('dd', {}, estimate(m.gain_equal_time), known(m.gain_equal_time.value) && ' ×')));
+              el('dl', {}, smaller('relMSE', m.gain_relmse), smaller('MSE at equal time*', m.gain_equal_time)));
   };
   return el('div', {id: 'gains'}, el('div', {class: 'cards'}, methods.filter((m, i) => i !== baseline).map(card)),
             el('p', {class: 'fine'}, '* all training counted, if the error falls as 1 / time'));
@@ -139,7 +140,7 @@ function tableSection(data) {
                    el('tbody', {}, methods.map((m) => el('tr', {}, columns.map(({cell}) => cell(m))))));
   const words = [
     hasErrors && methods.length > 1 && `A gain is the error of ${methods[baseline].method} over the method’s.`,
-    runs > 1 && '± is the standard error of the mean over runs.',
+    runs > 1 ? '± is the standard error of the mean over runs.' : hasErrors && 'One run each, so the spread over runs is not known.',
     hasErrors && data.comparison.reference_has_variance && 'The reference’s own noise is subtracted from MSE and relMSE.',
     hasErrors && 'relMSE = (I − R)² / (R² + 0.01); trimmed: without the worst 0.1 % of pixels.',
   ];
@@ -211,10 +212,13 @@ function trainingSection(data) {
       name: `${field === 'loss' ? 'training' : 'held out'}${runs.length > 1 ? `, run ${i + 1}` : ''}`, index, dashed: field === 'loss', faint: i > 0, marks: false,
       points: run.training_curve.map((p) => ({x: p.seconds, y: p[field]})),
     })));
-    const chart = linePlot(series, {title: 'mean −ln q, nats', x: {label: 'seconds of training', fromZero: true}, y: {}, describe: `Training of ${m.method}: loss on training and held-out examples over time`});
-    if (!chart) return null;
+    if (!runs.some((run) => run.training_curve.length)) return null;
+    const isCurve = runs.some((run) => run.training_curve.length > 1);
+    const chart = isCurve && linePlot(series, {title: 'mean −ln q, nats', x: {label: 'seconds of training', fromZero: true}, y: {},
+                                               describe: `Training of ${m.method}: loss on training and held-out examples over time`});
     const run = runs[0], last = run.training_curve.at(-1);
     const facts = [
+      !isCurve && `built in one go in ${formatSeconds(last?.seconds)}: mean −ln q ${formatNumber(last?.held_out)} nats over held-out examples`,
       run.candidates > 0 && `${groupDigits(run.candidates)} candidates${known(run.candidates_nonzero) ? `, ${(100 * run.candidates_nonzero).toFixed(1)} % of them above zero` : ''}`,
       last?.samples > 0 && `${groupDigits(last.samples)} examples seen`,
       run.training_stopped && `ended: ${run.training_stopped}`,
@@ -233,20 +237,21 @@ function densitySection(data) {
   return section('densities', 'Where samples went',
                  'Left: the candidates, weighted by the target. Right: the density that was learned from them. 1 is the uniform density; overlap is the share that the two have in common.',
                  methods.map((method) => el('article', {class: 'density'}, el('h3', {}, methodLabel(method, methodIndex(data, method))),
-                     el('div', {class: 'pairs'}, data.densities.filter((d) => d.method === method).map(densityPair)))));
+                     el('div', {class: 'pairs'}, data.densities.filter((d) => d.method === method).map((d) => densityPair(d, data.comparison))))));
 }
 
-function densityPair(d) {
+function densityPair(d, {width, height}) {
   const candidates = decodeGrid(d.candidates), learned = decodeGrid(d.learned);
   // One scale for both; the root makes the faint parts seen beside the peaks.
   const top = Math.max(1, percentile([...candidates.values, ...learned.values], 0.995));
-  const down = d.y_dimension.startsWith('film');
+  const down = d.y_dimension.startsWith('film'), isFilm = down && d.x_dimension.startsWith('film') && width > 0 && height > 0;
   const draw = (grid, name) => {
     const canvas = colorCanvas(grid.width, grid.height, kHeat, (i) => {
       const row = Math.floor(i / grid.width), j = down ? row : grid.height - 1 - row;
       return Math.sqrt(Math.max(0, grid.values[j * grid.width + (i % grid.width)]) / top);
     });
-    build(canvas, {role: 'img', 'aria-label': `${name}: density over ${d.x_dimension} and ${d.y_dimension}`}, []);
+    build(canvas, {role: 'img', 'aria-label': `${name}: density over ${d.x_dimension} and ${d.y_dimension}`,
+                   style: isFilm && `aspect-ratio:${width / height}`}, []);
     return el('div', {class: 'cell'}, el('span', {class: 'fine'}, name), canvas);
   };
   const ticks = [[0, '0'], ...(top > 2 ? [[Math.sqrt(1 / top), '1']] : []), ...(top > 12 ? [[0.5, formatNumber(top / 4, 2)]] : []), [1, `≥ ${formatNumber(top, 2)}`]];
