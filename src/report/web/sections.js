@@ -218,7 +218,7 @@ function trainingSection(data) {
                                                describe: `Training of ${m.method}: loss on training and held-out examples over time`});
     const run = runs[0], last = run.training_curve.at(-1);
     const facts = [
-      !isCurve && `built in one go in ${formatSeconds(last?.seconds)}: mean −ln q ${formatNumber(last?.held_out)} nats over held-out examples`,
+      !isCurve && `built in one go in ${formatSeconds(last?.seconds)}, mean −ln q = ${formatNumber(last?.held_out)} nats over held-out examples`,
       run.candidates > 0 && `${groupDigits(run.candidates)} candidates${known(run.candidates_nonzero) ? `, ${(100 * run.candidates_nonzero).toFixed(1)} % of them above zero` : ''}`,
       last?.samples > 0 && `${groupDigits(last.samples)} examples seen`,
       run.training_stopped && `ended: ${run.training_stopped}`,
