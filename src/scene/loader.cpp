@@ -86,7 +86,8 @@ Motion get_motion(const LoadContext& context, const Object& object, std::string_
 Imath::M44d get_still_transform(const Object& object, std::string_view name) {
   const Transform transform = object.get_transform(name);
   if (transform.size() > 1)
-    fail(object.find(name)->where, "a {} cannot be animated: only shapes and sensors can", object.tag);
+    fail(object.find(name)->where, "{} \"{}\" cannot be animated: only shapes and sensors can", object.tag,
+         object.type);
   return transform[0].matrix;
 }
 

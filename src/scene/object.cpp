@@ -129,7 +129,7 @@ void Object::check_all_read() const {
   for (const Property& property : properties) {
     if (property.read) continue;
     if (const auto* object = std::get_if<const Object*>(&property.value)) {
-      if (property.name.empty()) fail(property.where, "a {} cannot stand in {}", describe(**object), describe(*this));
+      if (property.name.empty()) fail(property.where, "{} cannot stand in {}", describe(**object), describe(*this));
     }
     std::vector<std::string_view> known(m_asked.begin(), m_asked.end());
     std::sort(known.begin(), known.end());

@@ -45,7 +45,7 @@ struct Emitter {
 };
 
 struct Sensor {
-  Matrix4 to_world[2];  ///< at shutter_open and shutter_close; the same for a camera that stands still
+  Matrix4 to_world[2];     ///< at shutter_open and shutter_close; the same for a camera that stands still
   float x_fov = 39.5978f;  ///< degrees, across the width of the film, fov_axis already applied
   float principal_x = 0, principal_y = 0;
   float near_clip = 1e-2f, far_clip = 1e4f;
@@ -56,8 +56,8 @@ struct Sensor {
 
 struct ReconstructionFilter {
   enum class Type : std::uint8_t { box, tent, gaussian, mitchell } type = Type::gaussian;
-  float radius = 2;      ///< pixels, from the centre
-  float stddev = 0.5f;   ///< gaussian
+  float radius = 2;                  ///< pixels, from the centre
+  float stddev = 0.5f;               ///< gaussian
   float b = 1 / 3.0f, c = 1 / 3.0f;  ///< mitchell
 };
 struct FilmSettings {
@@ -86,8 +86,9 @@ struct Scene {
 
 struct SceneOptions {
   std::vector<std::pair<std::string, std::string>> defines;  ///< -D name=value
-  int width = 0, height = 0;  ///< film size that replaces the file's; 0 keeps it. Applied before the field of view is resolved
-  int max_depth = 0;          ///< replaces the file's; 0 keeps it
+  int width = 0,
+      height = 0;     ///< film size that replaces the file's; 0 keeps it. Applied before the field of view is resolved
+  int max_depth = 0;  ///< replaces the file's; 0 keeps it
 };
 
 /// Reads a Mitsuba 3 scene file. Throws SceneError with file:line:column, what is wrong, and what would be right.

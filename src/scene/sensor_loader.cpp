@@ -12,7 +12,7 @@ constexpr int kMostPixels = 1 << 20;  // a side of the film
 
 const Object& only_one(const std::vector<const Property*>& found) {
   if (found.size() > 1)
-    fail(found[1]->where, "there is a {} already, at {}", std::get<const Object*>(found[1]->value)->tag,
+    fail(found[1]->where, "a second {}; the first is at {}", std::get<const Object*>(found[1]->value)->tag,
          to_string(found[0]->where));
   return *std::get<const Object*>(found[0]->value);
 }

@@ -14,11 +14,11 @@ namespace warpath {
 /// Triangles in world space. Vertex positions may have a second keyframe (linear motion of each vertex). Mirroring and
 /// flipping are done: the triangles' orientation and the normals agree, and flip_normals stays false.
 struct Mesh {
-  std::vector<Vec3> positions;      ///< one more entry than vertices: Embree reads 16 bytes at each
-  std::vector<Vec3> positions_end;  ///< the same when the shutter closes; empty if it stands still
-  std::vector<Vec3> normals;        ///< per vertex, unit; empty means face normals
-  std::vector<Vec3> normals_end;    ///< like positions_end
-  std::vector<Vec2> uvs;            ///< per vertex; empty means (0,0), (1,0), (0,1) on every face, as in Mitsuba
+  std::vector<Vec3> positions;         ///< one more entry than vertices: Embree reads 16 bytes at each
+  std::vector<Vec3> positions_end;     ///< the same when the shutter closes; empty if it stands still
+  std::vector<Vec3> normals;           ///< per vertex, unit; empty means face normals
+  std::vector<Vec3> normals_end;       ///< like positions_end
+  std::vector<Vec2> uvs;               ///< per vertex; empty means (0,0), (1,0), (0,1) on every face, as in Mitsuba
   std::vector<std::uint32_t> indices;  ///< 3 per triangle
   bool flip_normals = false;
   std::size_t triangle_count() const { return indices.size() / 3; }

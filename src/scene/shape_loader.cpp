@@ -153,7 +153,8 @@ void load_shape(LoadContext& context, const Object& object) {
 
   const auto only = [&](std::string_view tag) -> const Object* {
     const auto found = object.take_objects(tag);
-    if (found.size() > 1) fail(found[1]->where, "the shape has a {} already, at {}", tag, to_string(found[0]->where));
+    if (found.size() > 1)
+      fail(found[1]->where, "a second {} in one shape; the first is at {}", tag, to_string(found[0]->where));
     return found.empty() ? nullptr : std::get<const Object*>(found[0]->value);
   };
   if (const Object* emitter = only("emitter"))
