@@ -29,13 +29,10 @@ void expect_near(float ours, float theirs, float scale, const std::string& where
   EXPECT_NEAR(ours, theirs, 1e-3f * scale + 2e-5f) << where;
 }
 
-class MitsubaBsdf : public testing::TestWithParam<std::size_t> {};
-
-TEST_P(MitsubaBsdf, Agrees) {
-  const Json& c = data()["cases"][GetParam()];
+void compare(const Json& c) {
   const std::string name = c["name"];
   // Beside the images that it names.
-  const auto file = kData / ("bsdf_values." + std::to_string(GetParam()) + "." + std::to_string(::getpid()) + ".xml");
+  const auto file = kData / ("bsdf_values." + std::to_string(::getpid()) + ".xml");
   std::ofstream(file) << c["xml"].get<std::string>();
   Scene scene;
   try {
@@ -102,13 +99,10 @@ TEST_P(MitsubaBsdf, Agrees) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, MitsubaBsdf, testing::Range<std::size_t>(0, data()["cases"].size()),
-                         [](const testing::TestParamInfo<std::size_t>& info) {
-                           std::string name = data()["cases"][info.param]["name"];
-                           for (char& letter : name)
-                             if (letter == ' ') letter = '_';
-                           return name;
-                         });
+TEST(Mitsuba, AgreesOnBsdfsAndTextures) {
+  ASSERT_GT(data()["cases"].size(), 70u);
+  for (const Json& c : data()["cases"]) compare(c);
+}
 
 }  // namespace
 }  // namespace warpath
