@@ -89,21 +89,19 @@ Trainer::Trainer(const Examples& examples, const RealNvpSettings& settings, std:
   if (held_out < 1 || count < held_out + 1)
     throw ConfigError(fmt::format("{} examples are too few to train a Real NVP on", count));
 
-  // The shuffle of epoch 0 also says which examples are held out.
-  std::vector<std::uint32_t> all(count), rest;
-  std::iota(all.begin(), all.end(), 0u);
-  Shuffle deal(std::move(all), mix64(seed));
+  // The last rows are held out: copies of one candidate are adjacent, and must not stand on both sides.
+  const std::size_t trained = count - held_out;
+  const auto weight = [&](std::size_t i) { return examples.weight.empty() ? 1.0f : examples.weight[i]; };
+  std::vector<std::uint32_t> rest;
+  for (std::size_t i = 0; i < trained; ++i) {
+    if (!(weight(i) > 0)) continue;
+    rest.push_back(static_cast<std::uint32_t>(i));
+    m_mean_weight += static_cast<double>(weight(i));
+  }
   m_held_out.resize(held_out, dims);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t e = deal.next();
-    const float weight = examples.weight.empty() ? 1.0f : examples.weight[e];
-    if (i < held_out) {
-      m_held_out.set(i, examples.y.batch().row(e), weight);
-      m_held_out_weight += static_cast<double>(weight);
-    } else if (weight > 0) {
-      rest.push_back(e);
-      m_mean_weight += static_cast<double>(weight);
-    }
+  for (std::size_t i = trained; i < count; ++i) {
+    m_held_out.set(i - trained, examples.y.batch().row(i), weight(i));
+    m_held_out_weight += static_cast<double>(weight(i));
   }
   if (rest.empty() || !(m_held_out_weight > 0)) throw ConfigError("no example has any weight: nothing to train on");
   m_mean_weight /= static_cast<double>(rest.size());
