@@ -123,6 +123,9 @@ def main():
     write_ply(ASSETS / "bottle_ascii.ply", mesh, uvs=True, ascii=True)
     write_ply(ASSETS / "bottle_bare.ply", mesh, normals=False)
     write_house(ASSETS / "house.obj")
+    # Every texture coordinate belongs to one point, as Mitsuba's sampling of textured emitters needs.
+    shade = revolve([spline([(0.5, 0.2), (0.6, 0.8), (0.3, 1.4), (0.2, 1.7)], 3)], 20)
+    write_obj(ASSETS / "shade.obj", shade)
     plate = revolve([spline([(0.0, 0.3), (0.5, 0.35), (0.8, 0.6), (0.95, 1.0)], 3)], 20)
     write_serialized(ASSETS / "two.serialized", [mesh, mesh.moved(0.4).merged(plate)])
 
