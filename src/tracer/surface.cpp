@@ -70,6 +70,7 @@ Vec3 Surfaces::at(const HitStream& hits, std::size_t i, const RayStream& rays, S
   point.uv = surface.uv;
   point.dp_du = surface.dp_du, point.dp_dv = surface.dp_dv;
   point.dn_du = surface.dn_du, point.dn_dv = surface.dn_dv;
+  point.left_handed = false;
   return surface.position;
 }
 
@@ -121,6 +122,7 @@ void Surfaces::mesh_at(const Entry& shape, std::uint32_t primitive, float u, flo
     p2 = lerp(p2, mesh.positions_end[i2], time);
   }
   to_uv_basis(duv1, duv2, p1 - p0, p2 - p0, point.dp_du, point.dp_dv);
+  point.left_handed = point.dp_du.cross(point.dp_dv).dot(point.ng) < 0;
   to_uv_basis(duv1, duv2, dn1, dn2, point.dn_du, point.dn_dv);
 }
 
@@ -137,6 +139,7 @@ void Surfaces::rectangle_at(const Entry& shape, std::uint32_t primitive, float u
   point.dp_du = transform_vector(m, {2, 0, 0});
   point.dp_dv = transform_vector(m, {0, 2, 0});
   point.dn_du = point.dn_dv = Vec3(0);
+  point.left_handed = false;
 }
 
 }  // namespace warpath
