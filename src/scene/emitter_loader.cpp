@@ -127,6 +127,7 @@ std::int32_t load_area_emitter(LoadContext& context, const Object& object, std::
     if (!(constant->value.x >= 0 && constant->value.y >= 0 && constant->value.z >= 0))
       fail(object.find("radiance")->where, "\"radiance\" must not be negative");
   object.check_all_read();
+  context.attached_emitters.insert(&object);
   context.scene.emitters.push_back({object.id, weight, AreaEmitter{shape, radiance}});
   return static_cast<std::int32_t>(context.scene.emitters.size() - 1);
 }

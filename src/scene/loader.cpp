@@ -122,7 +122,11 @@ Scene load_scene(const fs::path& file, const SceneOptions& options) {
   for (const Property* shape : root.take_objects("shape")) load_shape(context, *std::get<const Object*>(shape->value));
   for (const Property* emitter : root.take_objects("emitter")) {
     const Object& object = *std::get<const Object*>(emitter->value);
-    if (object.type == "area") continue;  // waits for a shape that refers to it
+    if (object.type == "area") {  // shines where shapes refer to it
+      if (!context.attached_emitters.contains(&object))
+        log::warn("{}: the area emitter belongs to no shape, so it does not shine", to_string(object.where));
+      continue;
+    }
     load_emitter(context, object);
   }
   root.check_all_read();

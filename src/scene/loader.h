@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -24,6 +25,7 @@ class LoadContext {
   double shutter_open = 0, shutter_close = 0;  ///< known before shapes are loaded: keyframes are evaluated there
   std::map<const Object*, BsdfId> bsdfs;       ///< each is loaded once, however often it is referred to
   std::map<const Object*, TextureId> textures;
+  std::set<const Object*> attached_emitters;  ///< area emitters that a shape has
 
   /// The file that a property names; SceneError if there is none, with the nearest name in its folder.
   std::filesystem::path find(const Object& object, std::string_view property) const;

@@ -151,6 +151,8 @@ Mesh build_mesh(IndexedMesh&& source, const MeshPlacement& placement) {
     if (!source.uvs.empty()) mesh.uvs = gather(source.uvs, welded.uv);
     mesh.indices = std::move(welded.indices);
   }
+  for (Vec2& uv : mesh.uvs)
+    if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = Vec2(0.0f);  // nothing to look up there
   mesh.indices.shrink_to_fit();
   mesh.uvs.shrink_to_fit();
 

@@ -101,6 +101,15 @@ TEST(MeshBuilder, DegenerateTrianglesStayAndGiveNoNan) {
   expect_near(mesh.normals[3], {1, 0, 0});
 }
 
+TEST(MeshBuilder, TextureCoordinatesAreFinite) {
+  IndexedMesh source;
+  source.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  source.uvs = {{0, 0}, {NAN, 1}, {0.5f, 1}};
+  source.corner_position = {0, 1, 2};
+  const Mesh mesh = build_mesh(std::move(source), {});
+  EXPECT_EQ(mesh.uvs, (std::vector<Vec2>{{0, 0}, {0, 0}, {0.5f, 1}}));
+}
+
 TEST(MeshBuilder, MotionHasTwoOfEach) {
   MeshPlacement placement;
   placement.moving = true;

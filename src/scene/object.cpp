@@ -49,7 +49,7 @@ const T* Object::get(std::string_view name, std::string_view wanted) const {
   if (!property) return nullptr;
   const T* value = std::get_if<T>(&property->value);
   if (!value)
-    fail(property->where, "\"{}\" of {} must be a <{}>, not {}", name, describe(*this), wanted,
+    fail(property->where, "\"{}\" of {} must be {}, not {}", name, describe(*this), wanted,
          describe_type(property->value));
   return value;
 }
@@ -58,7 +58,7 @@ float Object::get_float(std::string_view name, float missing) const {
   const Property* property = take(name);
   if (!property) return missing;
   if (const auto* integer = std::get_if<std::int64_t>(&property->value)) return static_cast<float>(*integer);
-  const double value = *get<double>(name, "float");
+  const double value = *get<double>(name, "a <float>");
   if (!std::isfinite(value)) fail(property->where, "\"{}\" of {} must be finite, not {}", name, describe(*this), value);
   return static_cast<float>(value);
 }
@@ -70,7 +70,7 @@ float Object::require_float(std::string_view name) const {
 
 std::int64_t Object::get_integer(std::string_view name, std::int64_t missing, std::int64_t least,
                                  std::int64_t most) const {
-  const auto* value = get<std::int64_t>(name, "integer");
+  const auto* value = get<std::int64_t>(name, "an <integer>");
   if (!value) return missing;
   if (*value < least || *value > most)
     fail(find(name)->where, "\"{}\" of {} must be from {} to {}, not {}", name, describe(*this), least, most, *value);
@@ -78,12 +78,12 @@ std::int64_t Object::get_integer(std::string_view name, std::int64_t missing, st
 }
 
 bool Object::get_boolean(std::string_view name, bool missing) const {
-  const bool* value = get<bool>(name, "boolean");
+  const bool* value = get<bool>(name, "a <boolean>");
   return value ? *value : missing;
 }
 
 std::string Object::get_string(std::string_view name, std::string_view missing) const {
-  const std::string* value = get<std::string>(name, "string");
+  const std::string* value = get<std::string>(name, "a <string>");
   return value ? *value : std::string(missing);
 }
 
@@ -93,12 +93,12 @@ std::string Object::require_string(std::string_view name) const {
 }
 
 Imath::V3d Object::get_vector(std::string_view name, const Imath::V3d& missing) const {
-  const auto* value = get<Imath::V3d>(name, "point");
+  const auto* value = get<Imath::V3d>(name, "a <point>");
   return value ? *value : missing;
 }
 
 Transform Object::get_transform(std::string_view name) const {
-  const auto* value = get<Transform>(name, "transform");
+  const auto* value = get<Transform>(name, "a <transform>");
   return value ? *value : Transform{Keyframe{}};
 }
 

@@ -121,6 +121,11 @@ TEST_F(SceneTest, Emitters) {
             "s.xml:4:1: a scene has one \"envmap\" or \"constant\" emitter at most");
 }
 
+TEST_F(SceneTest, AreaEmitterWithoutAShapeIsNamed) {
+  EXPECT_TRUE(load_with_sensor("<emitter type=\"area\" id=\"light\"/>").emitters.empty());
+  EXPECT_EQ(warnings(), "s.xml:3:1: the area emitter belongs to no shape, so it does not shine\n");
+}
+
 TEST_F(SceneTest, FieldOfViewAsMitsuba) {
   const auto x_fov = [&](const std::string& properties) {
     return load(

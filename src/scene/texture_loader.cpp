@@ -67,10 +67,6 @@ Color load_spectrum(LoadContext& context, const Object& object, ColorRole role) 
   }
   if (object.type == "d65") {  // white in RGB, times what is in it
     const float scale = object.get_float("scale", 1);
-    const auto nested = object.take_objects("texture");
-    if (nested.size() > 1) fail(nested[1]->where, "a \"d65\" spectrum holds one texture at most");
-    if (!nested.empty())
-      fail(nested[0]->where, "a texture in a \"d65\" spectrum is not supported; use the texture itself");
     return object.has("color") ? get_color(context, object, "color", 1, ColorRole::unbounded) * scale : Color(scale);
   }
   return spectrum_to_rgb(get_spectrum(object), role, object.where);  // regular, irregular
@@ -83,6 +79,10 @@ TextureId load_uncached(LoadContext& context, const Object& object, ColorRole ro
     id = context.add_texture(load_bitmap(context, object));
   } else if (object.type == "checkerboard") {
     id = context.add_texture(load_checkerboard(context, object, role));
+  } else if (const auto nested = object.take_objects("texture"); object.type == "d65" && !nested.empty()) {
+    if (nested.size() > 1) fail(nested[1]->where, "a \"d65\" spectrum holds one texture at most");
+    object.ignore({"scale"});  // Mitsuba's RGB variants do
+    id = load_texture(context, *std::get<const Object*>(nested[0]->value), role);
   } else if (std::find(std::begin(kKnown), std::end(kKnown), object.type) != std::end(kKnown)) {
     id = context.add_texture(ConstantTexture{load_spectrum(context, object, role)});
   } else if (object.type == "blackbody") {
