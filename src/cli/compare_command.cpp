@@ -30,7 +30,7 @@ struct CompareCommand {
 
 }  // namespace
 
-void add_compare_command(CLI::App& app) {
+void add_compare_command(CLI::App& app, const std::string& command_line) {
   auto command = std::make_shared<CompareCommand>();
   auto& settings = command->settings;
   CLI::App* sub = app.add_subcommand("compare", "Render a scene by several methods, and report what each gains");
@@ -52,10 +52,8 @@ void add_compare_command(CLI::App& app) {
   settings.render.add_to(*sub);
   settings.common.add_to(*sub);
   settings.training.add_to(*sub);
-  sub->callback([command, &app] {
-    command->settings.command = app.config_to_str();
-    command->run();
-  });
+  settings.command = command_line;
+  sub->callback([command] { command->run(); });
 }
 
 }  // namespace warpath

@@ -139,8 +139,9 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)
-    trainer = std::make_unique<MethodTrainer>(m_tracer, m_settings.training.train_settings(seed),
-                                              m_settings.training.init, m_settings.common.quiet);
+    trainer =
+        std::make_unique<MethodTrainer>(m_tracer, m_settings.training.train_settings(seed), m_settings.training.init,
+                                        m_settings.training.use_samples(), m_settings.common.quiet);
   const PreparedMethod prepared = trainer->prepare(method);
   const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
 
@@ -164,6 +165,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
 
   ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed);
   {
+    prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_settings.runs),
                            m_settings.common.quiet);
     render_passes(estimator, budget, progress.callback(), [&] {

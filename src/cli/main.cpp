@@ -19,6 +19,18 @@ int fail(ExitCode code, const char* what) {
   return code;
 }
 
+/// As it was typed: words with anything but plain characters in quotes.
+std::string command_line(int argc, char** argv) {
+  constexpr auto kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./";
+  std::string line = "warpath";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool plain = !word.empty() && word.find_first_not_of(kPlain) == std::string::npos;
+    line += plain ? " " + word : " '" + word + "'";
+  }
+  return line;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -29,7 +41,7 @@ int main(int argc, char** argv) {
   app.get_formatter()->column_width(34);
   add_render_command(app);
   add_train_command(app);
-  add_compare_command(app);
+  add_compare_command(app, command_line(argc, argv));
   add_inspect_command(app);
   handle_interrupts();
   spdlog::set_default_logger(

@@ -53,10 +53,21 @@ std::shared_ptr<const Candidates> MethodTrainer::candidates(const Layout& layout
   const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
   StageProgress progress(fmt::format("candidates for {}", layout.name()), m_quiet);
   const PathIntegrand integrand(m_tracer, layout, seed);
-  known = std::make_shared<Candidates>(gather_candidates(integrand, layout, seed, count, [&](std::uint64_t done) {
-    progress.update(static_cast<double>(done) / static_cast<double>(count));
-  }));
+  known = std::make_shared<Candidates>(gather_candidates(
+      integrand, layout, seed, count,
+      [&](std::uint64_t done) { progress.update(static_cast<double>(done) / static_cast<double>(count)); },
+      m_use_samples));
   return known;
+}
+
+void PreparedMethod::add_candidates(ImageEstimator& estimator) const {
+  if (!candidates || candidates->contribution.empty()) return;
+  const std::uint32_t d = Group{GroupKind::film}.first_dimension();
+  for (std::uint64_t id = 0; id < candidates->size(); ++id) {
+    const std::uint64_t key = sample_key(candidates->seed, kFirstCandidate + id);
+    const float* f = candidates->contribution.data() + 3 * id;
+    estimator.add_uniform_sample(sample_float(key, d), sample_float(key, d + 1), Color(f[0], f[1], f[2]));
+  }
 }
 
 PreparedMethod MethodTrainer::prepare(const Method& method) {

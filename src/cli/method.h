@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "estimate/image_estimator.h"
 #include "tracer/tracer.h"
 #include "train/training_data.h"
 #include "warpath/layout.h"
@@ -27,6 +28,9 @@ struct PreparedMethod {
   TrainLog log;
   std::shared_ptr<const Candidates> candidates;  ///< null if it was not trained now
   double candidate_seconds = 0;
+
+  /// Adds the candidates to an image that is to have them (--training-samples use).
+  void add_candidates(ImageEstimator& estimator) const;
 };
 
 /// Gathers candidates and trains. Candidates are kept, so that methods over the same dimensions learn from the same
@@ -34,8 +38,12 @@ struct PreparedMethod {
 class MethodTrainer {
  public:
   MethodTrainer(std::shared_ptr<const Tracer> tracer, const TrainSettings& settings, std::filesystem::path init,
-                bool quiet)
-      : m_tracer(std::move(tracer)), m_settings(settings), m_init(std::move(init)), m_quiet(quiet) {}
+                bool use_samples, bool quiet)
+      : m_tracer(std::move(tracer)),
+        m_settings(settings),
+        m_init(std::move(init)),
+        m_use_samples(use_samples),
+        m_quiet(quiet) {}
   PreparedMethod prepare(const Method& method);
 
  private:
@@ -44,7 +52,7 @@ class MethodTrainer {
   std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;
   std::filesystem::path m_init;
-  bool m_quiet;
+  bool m_use_samples, m_quiet;
   std::map<std::string, std::shared_ptr<const Candidates>> m_candidates;  // by layout
 };
 

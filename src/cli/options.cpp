@@ -76,9 +76,8 @@ void TrainingOptions::add_to(CLI::App& app) {
   add("--uniform", settings.uniform, "Share of uniform samples in the mixture; keeps weights bounded")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--init", init, "Start training from this warp")->group(kGroup)->check(CLI::ExistingFile);
-  app.add_option("--training-samples", training_samples,
-                 "Whether candidates count in the image: discard (as the paper does, default) or use")
-      ->group(kGroup)
+  add("--training-samples", training_samples,
+      "Whether candidates count in the image: discard (as the paper does) or use")
       ->check(CLI::IsMember({"discard", "use"}));
 
   constexpr auto kNvp = "Real NVP";

@@ -33,11 +33,12 @@ struct TrainingOptions {
   double epp = 16;
   std::uint64_t examples = 0;  ///< 0: epp x 200 x 160
   std::filesystem::path init;
-  std::string training_samples;  ///< discard or use; empty: as the family has it
+  std::string training_samples = "discard";  ///< or use: candidates count in the image
   TrainSettings settings;
 
   void add_to(CLI::App& app);
   TrainSettings train_settings(std::uint64_t seed) const;
+  bool use_samples() const { return training_samples == "use"; }
 
  private:
   std::string m_bn = "actnorm", m_kdtree_target = "mean", m_architecture = "default";

@@ -29,10 +29,12 @@ struct RenderCommand {
     const Budget budget = make_budget(render, tracer->scene().sample_count);
     const auto clock = start_clock();
 
-    MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, common.quiet);
+    MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
+                          common.quiet);
     const PreparedMethod prepared = trainer.prepare(method);
     ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed);
     {
+      prepared.add_candidates(estimator);
       StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);
       render_passes(estimator, budget, progress.callback(), [] {});
     }

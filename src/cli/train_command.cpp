@@ -26,7 +26,7 @@ struct TrainCommand {
           fmt::format("--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree or realnvp", warp));
     const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
     const TrainSettings settings = training.train_settings(common.seed);
-    MethodTrainer trainer(tracer, settings, training.init, common.quiet);
+    MethodTrainer trainer(tracer, settings, training.init, false, common.quiet);
     const PreparedMethod prepared = trainer.prepare(method);
 
     WarpFile file{prepared.proposal, method.layout, tracer->scene().file.filename().string(), {}};

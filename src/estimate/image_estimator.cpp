@@ -229,7 +229,26 @@ void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& sto
   m_cost.emission_seconds += seconds_since(start);
 }
 
-ImageEstimate ImageEstimator::develop_rest() const { return m_film.develop(); }
+void ImageEstimator::add_uniform_sample(float film_x, float film_y, const Color& radiance) {
+  const FilmSettings& film = m_tracer.scene().film;
+  if (!m_uniform) m_uniform.emplace(film, Film::Weights::expected);
+  m_uniform->add(film_x * static_cast<float>(film.crop_width), film_y * static_cast<float>(film.crop_height), radiance);
+}
+
+ImageEstimate ImageEstimator::develop_rest() const {
+  ImageEstimate image = m_film.develop();
+  if (!m_uniform) return image;
+  // One weight for the whole image, from counts alone: weights that looked at the values would bias it.
+  const ImageEstimate uniform = m_uniform->develop();
+  const auto n = static_cast<double>(m_film.samples() + m_uniform->samples());
+  const auto share = static_cast<float>(static_cast<double>(m_uniform->samples()) / n);
+  for (std::size_t p = 0; p < image.mean.size(); ++p) {
+    image.mean[p] = image.mean[p] * (1 - share) + uniform.mean[p] * share;
+    image.variance[p] = image.variance[p] * sqr(1 - share) + uniform.variance[p] * sqr(share);
+    image.samples[p] += uniform.samples[p];
+  }
+  return image;
+}
 
 ImageEstimate ImageEstimator::develop_emission() const {
   if (m_emission) return m_emission->develop();
@@ -239,7 +258,7 @@ ImageEstimate ImageEstimator::develop_emission() const {
 }
 
 ImageEstimate ImageEstimator::develop() const {
-  ImageEstimate image = m_film.develop();
+  ImageEstimate image = develop_rest();
   if (!m_emission) return image;
   const ImageEstimate emission = m_emission->develop();
   for (std::size_t p = 0; p < image.mean.size(); ++p) {
@@ -250,11 +269,12 @@ ImageEstimate ImageEstimator::develop() const {
 }
 
 double ImageEstimator::spp() const {
-  return static_cast<double>(m_cost.samples) / static_cast<double>(m_pixels.size());
+  const std::uint64_t samples = m_cost.samples + (m_uniform ? m_uniform->samples() : 0);
+  return static_cast<double>(samples) / static_cast<double>(m_pixels.size());
 }
 
 std::uint64_t ImageEstimator::non_finite() const {
-  return m_film.non_finite() + (m_emission ? m_emission->non_finite() : 0);
+  return m_film.non_finite() + (m_emission ? m_emission->non_finite() : 0) + (m_uniform ? m_uniform->non_finite() : 0);
 }
 
 }  // namespace warpath

@@ -41,6 +41,10 @@ class ImageEstimator {
   /// Adds 4 x `spp` camera rays to each pixel that may see an emitter, and no path.
   void add_emission_pass(int spp, const std::function<bool()>& stop = {});
 
+  /// A path that was traced elsewhere from uniform numbers, film position (in [0,1)^2) included, such as a candidate of
+  /// the warp's training. Those paths make an image of their own, which counts with its share of all samples.
+  void add_uniform_sample(float film_x, float film_y, const Color& radiance);
+
   ImageEstimate develop() const;           ///< the whole image
   ImageEstimate develop_rest() const;      ///< without directly seen emission
   ImageEstimate develop_emission() const;  ///< directly seen emission alone
@@ -59,7 +63,7 @@ class ImageEstimator {
   std::vector<std::uint32_t> m_pixels;           // in the order in which they are rendered: compact tiles
   std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
   Film m_film;
-  std::optional<Film> m_emission;
+  std::optional<Film> m_emission, m_uniform;
   int m_passes_spp = 0;  // samples per pixel begun so far: numbers the samples
   std::uint64_t m_emission_rays = 0;
   RenderCost m_cost;

@@ -4,6 +4,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -56,6 +57,10 @@ std::uint64_t evaluate_batch(const Integrand& integrand, Candidates& candidates,
     candidates.target[first + i] = finite ? target : 0.0f;
     non_finite += !finite;
   }
+  if (!candidates.contribution.empty())
+    for (std::size_t i = 0; i < count; ++i)
+      std::copy(f.row(i).begin(), f.row(i).end(),
+                candidates.contribution.begin() + static_cast<std::ptrdiff_t>((first + i) * f.cols()));
   return non_finite;
 }
 
@@ -67,10 +72,14 @@ void Candidates::primary_sample(std::uint64_t id, float* y) const {
 }
 
 Candidates gather_candidates(const Integrand& integrand, const Layout& layout, std::uint64_t seed, std::uint64_t count,
-                             const CandidateProgress& progress) {
+                             const CandidateProgress& progress, bool keep_contributions) {
   WARPATH_CHECK_EQ(integrand.dims(), layout.dims());
   const auto start = std::chrono::steady_clock::now();
-  Candidates candidates{.layout = layout, .seed = seed, .target = std::vector<float>(count)};
+  Candidates candidates;
+  candidates.layout = layout;
+  candidates.seed = seed;
+  candidates.target.resize(count);
+  if (keep_contributions) candidates.contribution.resize(count * static_cast<std::size_t>(integrand.channels()));
   tbb::enumerable_thread_specific<Workspace> workspaces(static_cast<std::size_t>(integrand.dims()),
                                                         static_cast<std::size_t>(integrand.channels()));
   std::mutex mutex;

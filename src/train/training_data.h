@@ -18,9 +18,10 @@ inline constexpr std::uint64_t kFirstCandidate = std::uint64_t{1} << 63;
 struct Candidates {
   Layout layout;
   std::uint64_t seed = 0;
-  std::vector<float> target;     ///< g >= 0 of candidate id = 0, 1, ...; non-finite ones are stored as 0
-  std::uint64_t non_finite = 0;  ///< how many were not finite
-  double seconds = 0;            ///< wall time that it took
+  std::vector<float> target;        ///< g >= 0 of candidate id = 0, 1, ...; non-finite ones are stored as 0
+  std::vector<float> contribution;  ///< f, count x channels, as it came; only where it was asked for
+  std::uint64_t non_finite = 0;     ///< how many were not finite
+  double seconds = 0;               ///< wall time that it took
   std::size_t size() const { return target.size(); }
   /// y of candidate `id`: layout.dims() numbers, the ones that a UniformSource of this seed gives to the sample
   /// kFirstCandidate + id.
