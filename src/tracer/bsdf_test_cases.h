@@ -121,6 +121,12 @@ inline std::vector<BsdfCase> all_bsdf_cases(BsdfBuilder& b) {
   add("normalmap of twosided", map(b.add(TwoSided{diffuse, diffuse})));
   add("twosided normalmap", b.add(TwoSided{map(b.rough_plastic(ggx, 0.3f)), diffuse}));
   add("normalmap glass", map(b.rough_dielectric(ggx, 0.4f, 0.4f, 1.5f)));
+  Image bumps{4, 3, 1, false, std::vector<std::uint8_t>{10, 90, 200, 40, 150, 20, 80, 230, 60, 170, 120, 5}};
+  const TextureId displacement =
+      b.texture(BitmapTexture{.image = std::make_shared<const Image>(std::move(bumps)), .to_uv = {}});
+  const BsdfId bumpy = b.add(BumpMap{brushed, displacement, 0.1f, true, true});
+  add("bumpmap", bumpy);
+  add("twosided bumpmap", b.add(TwoSided{bumpy, bumpy}));
   add("normalmap of normalmap", map(map(brushed)));
   add("blend of normalmaps", b.add(BlendBsdf{map(diffuse), map(map(glossy)), b.value(0.5f)}));
   return cases;
