@@ -13,6 +13,7 @@ struct RealNvpSettings {
   int couplings = 8;
   int width = 64;
   int blocks = 1;       ///< residual blocks of two dense layers in each of s and t
+  int bins = 0;         ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
   bool shared = false;  ///< s and t from one network with two heads
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
   double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)
