@@ -35,7 +35,7 @@ struct KdTreeSettings {
   enum class Split { cyclic, best } split = Split::best;
   int max_leaves = 1 << 14;
   int min_samples = 50;  ///< candidates in a leaf
-  double shrink = 30;    ///< a cell's mean is drawn to its parent's as if by that many samples
+  double shrink = 300;   ///< a cell's mean is drawn to its parent's as if by that many samples
 };
 
 struct GridSettings {
