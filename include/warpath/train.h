@@ -15,6 +15,9 @@ struct RealNvpSettings {
   int blocks = 1;       ///< residual blocks of two dense layers in each of s and t
   int bins = 0;         ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
   bool shared = false;  ///< s and t from one network with two heads
+  /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that any
+  /// two dimensions come to stand on different sides.
+  enum class Masks { alternating, binary } masks = Masks::binary;
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
   double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)
   int batch = 2000;
@@ -35,7 +38,7 @@ struct KdTreeSettings {
   enum class Split { cyclic, best } split = Split::best;
   int max_leaves = 1 << 14;
   int min_samples = 50;  ///< candidates in a leaf
-  double shrink = 300;   ///< a cell's mean is drawn to its parent's as if by that many samples
+  double shrink = 16;    ///< a cell's mean is drawn to its parent's, the more the noisier the target; 0 believes it
 };
 
 struct GridSettings {

@@ -39,14 +39,16 @@ struct Range {
   std::size_t size() const { return end - begin; }
 };
 
-/// Number of rows and sum of their values.
+/// Number of rows, sum of their values and of their squares.
 struct Tally {
-  double count = 0, sum = 0;
+  double count = 0, sum = 0, square = 0;
   Tally& operator+=(const Tally& other) {
     count += other.count;
     sum += other.sum;
+    square += other.square;
     return *this;
   }
+  Tally operator-(const Tally& other) const { return {count - other.count, sum - other.sum, square - other.square}; }
 };
 
 class Grower {
@@ -80,13 +82,22 @@ class Grower {
     int dim = -1;
     float at = 0;
     Tally lower, upper;
+    double shrink = 0;
   };
 
+  /// By how many samples of a cell's own mean those of its parts are held back. A mean of n values with a coefficient
+  /// of variation c has a relative error of c / sqrt(n): noisy values need more of them before they are believed,
+  /// smooth ones hardly any.
+  double shrinking_samples(const Tally& cell) const {
+    if (!(cell.sum > 0)) return 0;
+    return m_settings.shrink * std::max(0.0, cell.count * cell.square / (cell.sum * cell.sum) - 1);
+  }
+
   /// The mean in a part of a cell.
-  double shrunk_mean(const Tally& tally, double volume, double parent) const {
-    const double expected = m_uniform ? tally.count : m_total * volume;
-    const double mean = expected > 0 ? tally.sum / expected : 0;
-    return (tally.count * mean + m_settings.shrink * parent) / (tally.count + m_settings.shrink);
+  double shrunk_mean(const Tally& part, double volume, double mean_of_cell, double shrink) const {
+    const double expected = m_uniform ? part.count : m_total * volume;
+    const double mean = expected > 0 ? part.sum / expected : 0;
+    return (part.count * mean + shrink * mean_of_cell) / (part.count + shrink);
   }
 
   /// What a split gains. second_moment: the square root of the second moment of f / q over all leaves is the sum of
@@ -111,7 +122,7 @@ class Grower {
       const double value = m_values[from][i];
       for (std::size_t d = first_dim; d < end_dim; ++d) {
         const auto bin = std::min(static_cast<std::size_t>((y[d] - box.low[d]) * scale[d]), bins - 1);
-        tallies[(d - first_dim) * bins + bin] += {1, value};
+        tallies[(d - first_dim) * bins + bin] += {1, value, value * value};
       }
     }
   }
@@ -134,23 +145,25 @@ class Grower {
       tally_rows(box, range, from, first_dim, end_dim, bins, tallies);
     }
 
+    Tally whole;
+    for (std::size_t b = 0; b < bins; ++b) whole += tallies[b];
+    const double shrink = shrinking_samples(whole);
     Split best;
     for (std::size_t d = first_dim; d < end_dim; ++d) {
       const Tally* of_dim = &tallies[(d - first_dim) * bins];
-      Tally all, lower;
-      for (std::size_t b = 0; b < bins; ++b) all += of_dim[b];
+      Tally lower;
       for (std::size_t b = 1; b < bins; ++b) {
         lower += of_dim[b - 1];
-        const Tally upper{all.count - lower.count, all.sum - lower.sum};
+        const Tally upper = whole - lower;
         if (std::min(lower.count, upper.count) < m_settings.min_samples) continue;
         const double share = static_cast<double>(b) / static_cast<double>(bins);
         const auto at = static_cast<float>(box.low[d] + share * (static_cast<double>(box.high[d]) - box.low[d]));
         if (!(box.low[d] < at && at < box.high[d])) continue;
         const double volume_a = cell.volume * share, volume_b = cell.volume - volume_a;
-        const double here = cyclic ? all.sum
-                                   : gain(shrunk_mean(lower, volume_a, cell.mean), volume_a,
-                                          shrunk_mean(upper, volume_b, cell.mean), volume_b);
-        if (here > best.gain) best = {here, static_cast<int>(d), at, lower, upper};
+        const double here = cyclic ? whole.sum
+                                   : gain(shrunk_mean(lower, volume_a, cell.mean, shrink), volume_a,
+                                          shrunk_mean(upper, volume_b, cell.mean, shrink), volume_b);
+        if (here > best.gain) best = {here, static_cast<int>(d), at, lower, upper, shrink};
       }
     }
     return best;
@@ -208,8 +221,8 @@ class Grower {
     lower.volume =
         cell.volume * (static_cast<double>(split.at) - box.low[d]) / (static_cast<double>(box.high[d]) - box.low[d]);
     upper.volume = cell.volume - lower.volume;
-    lower.mean = shrunk_mean(split.lower, lower.volume, cell.mean);
-    upper.mean = shrunk_mean(split.upper, upper.volume, cell.mean);
+    lower.mean = shrunk_mean(split.lower, lower.volume, cell.mean, split.shrink);
+    upper.mean = shrunk_mean(split.upper, upper.volume, cell.mean, split.shrink);
     const std::size_t middle = partition(range, from, split.dim, split.at);
     const auto grow_lower = [&] { grow(lower, lower_box, {range.begin, middle}, 1 - from, depth + 1); };
     const auto grow_upper = [&] { grow(upper, upper_box, {middle, range.end}, 1 - from, depth + 1); };

