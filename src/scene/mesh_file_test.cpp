@@ -208,5 +208,37 @@ TEST_F(MeshFileTest, SerializedErrors) {
   EXPECT_EQ(error(broken, 0), "m.serialized: the compressed data are broken");
 }
 
+/// Broken copies of a file: cut short, or with some bytes changed. Fixed seed: the same copies each time.
+template <class Read>
+void expect_mesh_or_error(const TemporaryFiles& files, const std::string& good, Read&& read) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 1000; ++i) {
+    std::string bytes = good;
+    if (i % 3 == 0) bytes.resize(random() % (good.size() + 1));
+    for (int k = i % 4; k > 0 && !bytes.empty(); --k) {
+      constexpr std::string_view kLikely = "0123456789-./ \n\xff";
+      bytes[random() % bytes.size()] = random() % 2 ? kLikely[random() % kLikely.size()] : static_cast<char>(random());
+    }
+    const auto path = files.write("broken", bytes);
+    try {
+      const IndexedMesh mesh = read(path);
+      for (const std::uint32_t index : mesh.corner_position) ASSERT_LT(index, mesh.positions.size());
+      for (const std::uint32_t index : mesh.corner_uv) ASSERT_TRUE(index == kNoIndex || index < mesh.uvs.size());
+      for (const Vec3& p : mesh.positions) ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+    } catch (const MeshError&) {
+    }
+  }
+}
+
+TEST_F(MeshFileTest, BrokenFilesGiveAMeshOrAnError) {
+  expect_mesh_or_error(m_files, "v 0 0 0\nv 1 0 0.5e1\nv -1 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2//1 3\nf -1 -2 -3 1\n",
+                       [](const auto& path) { return read_obj(path, true); });
+  for (const std::string& good : {std::string(kAsciiPly), binary_ply(false), binary_ply(true)})
+    expect_mesh_or_error(m_files, good, [](const auto& path) { return read_ply(path, false); });
+  for (const int index : {0, 1})
+    expect_mesh_or_error(m_files, serialized_file(),
+                         [&](const auto& path) { return read_serialized(path, index).mesh; });
+}
+
 }  // namespace
 }  // namespace warpath

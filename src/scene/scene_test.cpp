@@ -1,5 +1,6 @@
 // Shapes, emitters, sensors, films and integrators of scene files.
 #include <cmath>
+#include <random>
 
 #include "scene/scene_fixture.h"
 
@@ -231,6 +232,33 @@ TEST_F(SceneTest, SensorsMayBeScaledEvenly) {
       "s.xml:2:28: the sensor's to_world shears or scales unevenly; it may turn, move and mirror");
   EXPECT_EQ(error_of<SceneError>(m_files, [&] { load("<sensor type=\"thinlens\"/>"); }),
             "s.xml:2:1: sensor \"thinlens\" needs a <float name=\"aperture_radius\">");
+}
+
+TEST_F(SceneTest, BrokenScenesGiveASceneOrAnError) {
+  const std::string good =
+      R"(<scene version="3.0.0"><default name="n" value="3"/><sensor type="perspective"><float name="fov" value="30"/>
+<film type="hdrfilm"><integer name="width" value="$n"/><rfilter type="tent"/></film></sensor><shape type="cube" id="a">
+<transform name="to_world"><rotate x="1" angle="20"/><lookat origin="1 2 3" target="0 0 0" up="0 1 0"/></transform>
+<bsdf type="twosided" id="b"><bsdf type="diffuse"><rgb name="reflectance" value="#102030"/></bsdf></bsdf></shape>
+<shape type="sphere"><ref id="b"/><emitter type="area"><spectrum name="radiance" value="400:1, 700:2"/></emitter></shape></scene>)";
+  EXPECT_EQ(load_scene(m_files.write("s.xml", good)).shapes.size(), 2u);
+  std::mt19937 random(11);  // fixed seed: the same copies each time
+  int errors = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::string bytes = good;
+    for (int k = i % 3; k >= 0; --k) {
+      constexpr std::string_view kLikely = "<>\"=/$ 0-9.e#,:abt\n";
+      bytes[random() % bytes.size()] = kLikely[random() % kLikely.size()];
+    }
+    const auto path = m_files.write("s.xml", bytes);
+    try {
+      load_scene(path);
+    } catch (const SceneError& error) {
+      ++errors;
+      EXPECT_NE(std::string_view(error.what()).find("s.xml:"), std::string_view::npos) << error.what();
+    }
+  }
+  EXPECT_GT(errors, 500);
 }
 
 TEST_F(SceneTest, LoadsTheSameForAnyOrderOfThreads) {
