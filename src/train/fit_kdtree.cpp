@@ -89,8 +89,9 @@ class Grower {
   /// of variation c has a relative error of c / sqrt(n): noisy values need more of them before they are believed,
   /// smooth ones hardly any.
   double shrinking_samples(const Tally& cell) const {
-    if (!(cell.sum > 0)) return 0;
-    return m_settings.shrink * std::max(0.0, cell.count * cell.square / (cell.sum * cell.sum) - 1);
+    if (!(cell.sum > 0) || m_settings.shrink == 0) return 0;
+    constexpr double kLeast = 5;  // a few values may be alike by chance
+    return kLeast + m_settings.shrink * std::max(0.0, cell.count * cell.square / (cell.sum * cell.sum) - 1);
   }
 
   /// The mean in a part of a cell.
