@@ -10,13 +10,13 @@ namespace warpath {
 
 /// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
 struct RealNvpSettings {
-  int couplings = 8;
-  int width = 64;
+  int couplings = 16;
+  int width = 32;
   int blocks = 1;       ///< residual blocks of two dense layers in each of s and t
-  int bins = 0;         ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
+  int bins = 15;        ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
   bool shared = false;  ///< s and t from one network with two heads
-  /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that any
-  /// two dimensions come to stand on different sides.
+  /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that
+  /// any two dimensions come to stand on different sides.
   enum class Masks { alternating, binary } masks = Masks::binary;
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
   double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)

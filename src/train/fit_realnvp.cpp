@@ -23,6 +23,8 @@ RealNvpSettings released_realnvp() {
   s.width = 512;
   s.blocks = 8;
   s.rate = 1e-4;
+  s.bins = 0;
+  s.masks = RealNvpSettings::Masks::alternating;
   s.norm = RealNvpSettings::Norm::batch;
   return s;
 }
@@ -119,8 +121,9 @@ Floats Trainer::start_from(const Proposal& init) const {
   if (!warp) throw ConfigError(fmt::format("a {} cannot start the training of a realnvp", init.family()));
   const RealNvpSettings &a = warp->settings(), &b = m_settings;
   const auto text = [](const RealNvpSettings& s, int dims) {
-    return fmt::format("{}D, {} couplings x {}, {} blocks, {}, norm {}", dims, s.couplings, s.width, s.blocks,
-                       s.shared ? "shared" : "separate", static_cast<int>(s.norm));
+    return fmt::format("{}D, {} couplings x {}, {} blocks, {} bins, {}, {} masks, norm {}", dims, s.couplings, s.width,
+                       s.blocks, s.bins, s.shared ? "shared" : "separate",
+                       s.masks == RealNvpSettings::Masks::binary ? "binary" : "alternating", static_cast<int>(s.norm));
   };
   if (text(a, warp->dims()) != text(b, m_flow.dims()))
     throw ConfigError(fmt::format("the weights to start from are of a Real NVP of {}; this one has {}",
@@ -136,12 +139,10 @@ void Trainer::initialise_norms(Floats& parameters) const {
     realnvp::logit(m_batch.y.data() + i * kBlock, v.data() + i * kBlock);
   parallel(m_flow.couplings().size(), [&](std::size_t c) {
     const realnvp::Coupling& coupling = m_flow.couplings()[c];
-    const std::size_t kept = coupling.kept.size();
-    Floats x(blocks * kept * kBlock);
+    const std::size_t inputs = static_cast<std::size_t>(coupling.nets[0].inputs());
+    Floats x(blocks * inputs * kBlock);
     for (std::size_t b = 0; b < blocks; ++b)
-      for (std::size_t k = 0; k < kept; ++k)
-        realnvp::encode(v.data() + (b * m_batch.dims + static_cast<std::size_t>(coupling.kept[k])) * kBlock,
-                        x.data() + (b * kept + k) * kBlock);
+      m_flow.encode_kept(coupling, v.data() + b * m_batch.dims * kBlock, x.data() + b * inputs * kBlock);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
       nn::initialise_actnorm(coupling.nets[n], static_cast<int>(blocks), x.data(),
                              parameters.data() + coupling.parameters[n]);

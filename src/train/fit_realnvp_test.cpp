@@ -55,6 +55,8 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     s.width = run.at("width");
     s.blocks = run.at("blocks");
     s.shared = run.at("shared");
+    s.bins = 0;
+    s.masks = RealNvpSettings::Masks::alternating;
     const std::string norm = run.at("norm");
     SCOPED_TRACE(norm);
     if (norm == "batch") continue;

@@ -44,6 +44,7 @@ void for_blocks(const realnvp::Flow& flow, Batch<const double> from, Batch<doubl
   }
 }
 
+constexpr std::array<std::string_view, 2> kMasks{"alternating", "binary"};
 constexpr std::array<std::string_view, 3> kNorms{"none", "actnorm", "batch"};
 
 int load_int(const TensorFile& file, const std::string& prefix, const char* key, int most) {
@@ -53,6 +54,15 @@ int load_int(const TensorFile& file, const std::string& prefix, const char* key,
   if (error != std::errc() || end != text.data() + text.size() || value < 0 || value > most)
     fail_load(file, prefix, fmt::format("{} \"{}\", not 0 to {}", key, text, most));
   return value;
+}
+
+template <class Enum, std::size_t N>
+Enum load_enum(const TensorFile& file, const std::string& prefix, const char* key,
+               const std::array<std::string_view, N>& names) {
+  const std::string& text = file.meta(prefix + key);
+  const auto found = std::find(names.begin(), names.end(), text);
+  if (found == names.end()) fail_load(file, prefix, fmt::format("unknown {} \"{}\"", key, text));
+  return static_cast<Enum>(found - names.begin());
 }
 
 std::vector<std::int64_t> shape_of(const realnvp::ParameterView& view) {
@@ -94,6 +104,8 @@ void RealNvp::save(TensorFile& file, const std::string& prefix) const {
   meta[prefix + "width"] = std::to_string(s.width);
   meta[prefix + "blocks"] = std::to_string(s.blocks);
   meta[prefix + "shared"] = std::to_string(s.shared ? 1 : 0);
+  meta[prefix + "bins"] = std::to_string(s.bins);
+  meta[prefix + "masks"] = kMasks[static_cast<std::size_t>(s.masks)];
   meta[prefix + "norm"] = kNorms[static_cast<std::size_t>(s.norm)];
   std::vector<float> values;
   for (const realnvp::ParameterView& view : m_flow.views()) {
@@ -111,10 +123,9 @@ std::shared_ptr<const RealNvp> RealNvp::load(const TensorFile& file, const std::
   s.width = load_int(file, prefix, "width", 8192);
   s.blocks = load_int(file, prefix, "blocks", 100);
   s.shared = load_int(file, prefix, "shared", 1) == 1;
-  const std::string& norm = file.meta(prefix + "norm");
-  const auto known = std::find(kNorms.begin(), kNorms.end(), norm);
-  if (known == kNorms.end()) fail_load(file, prefix, fmt::format("unknown norm \"{}\"", norm));
-  s.norm = static_cast<RealNvpSettings::Norm>(known - kNorms.begin());
+  s.bins = load_int(file, prefix, "bins", 256);
+  s.masks = load_enum<RealNvpSettings::Masks>(file, prefix, "masks", kMasks);
+  s.norm = load_enum<RealNvpSettings::Norm>(file, prefix, "norm", kNorms);
   if (s.couplings < 1 || s.width < 16 || s.width % 16 != 0)
     fail_load(file, prefix, fmt::format("{} couplings of width {} make no Real NVP", s.couplings, s.width));
 

@@ -1,6 +1,7 @@
 #include "warp/realnvp_flow.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -26,6 +27,23 @@ nn::Norm norm_of(RealNvpSettings::Norm norm) {
   throw InternalError("unknown normalisation");
 }
 
+/// Which side of split number `pair` a dimension is on; both couplings of a pair use one split, from either side.
+/// Alternating masks tell even from odd dimensions [DSB17]. Binary ones ask for the parity of some bits of the
+/// dimension's number: first of each bit alone, so that any two dimensions part within log2(dims) splits [GIK20], then
+/// of ever more bits together.
+auto mask(int dims, RealNvpSettings::Masks masks, int pair) {
+  unsigned bits = 1;
+  if (masks == RealNvpSettings::Masks::binary && dims > 2) {
+    const unsigned all = std::bit_ceil(static_cast<unsigned>(dims)) - 1;
+    std::vector<unsigned> order;
+    for (unsigned m = 1; m <= all; ++m) order.push_back(m);
+    std::stable_sort(order.begin(), order.end(),
+                     [](unsigned a, unsigned b) { return std::popcount(a) < std::popcount(b); });
+    bits = order[static_cast<std::size_t>(pair) % order.size()];
+  }
+  return [bits](int i) { return std::popcount(static_cast<unsigned>(i) & bits) % 2 == 1; };
+}
+
 const float* row(const float* rows, std::size_t r) { return rows + r * kBlock; }
 float* row(float* rows, std::size_t r) { return rows + r * kBlock; }
 float* row(float* rows, int r) { return rows + static_cast<std::size_t>(r) * kBlock; }
@@ -35,15 +53,17 @@ const float* row(const float* rows, int r) { return rows + static_cast<std::size
 
 Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings(settings) {
   if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
+  if (settings.bins < 0) throw ConfigError(fmt::format("bins {}: must not be negative", settings.bins));
   WARPATH_CHECK(dims >= 1);
   for (int c = 0; c < settings.couplings; ++c) {
     Coupling coupling;
-    // Alternating masks [DSB17]. A single dimension has nothing to be conditioned on: its networks have no inputs.
-    for (int i = 0; i < dims; ++i) (dims > 1 && i % 2 == c % 2 ? coupling.kept : coupling.moved).push_back(i);
+    // A single dimension has nothing to be conditioned on: its networks have no inputs.
+    const auto split = mask(dims, settings.masks, c / 2);
+    for (int i = 0; i < dims; ++i) (dims > 1 && split(i) == (c % 2 == 1) ? coupling.kept : coupling.moved).push_back(i);
     const int kept = static_cast<int>(coupling.kept.size()), moved = static_cast<int>(coupling.moved.size());
     for (int n = 0; n < (settings.shared ? 1 : 2); ++n) {
-      nn::ResidualNet net(kept, settings.width, settings.blocks, settings.shared ? 2 * moved : moved,
-                          norm_of(settings.norm));
+      nn::ResidualNet net(kept * encoded_rows(settings.bins), settings.width, settings.blocks,
+                          settings.shared ? 2 * moved : moved, norm_of(settings.norm));
       coupling.parameters.push_back(std::exchange(m_parameters, m_parameters + net.parameter_count()));
       coupling.packed.push_back(std::exchange(m_packed, m_packed + net.packed_count()));
       coupling.packed_back.push_back(std::exchange(m_packed_back, m_packed_back + net.packed_back_count()));
@@ -51,7 +71,7 @@ Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings
       coupling.nets.push_back(std::move(net));
     }
     coupling.scales = std::exchange(m_parameters, m_parameters + static_cast<std::size_t>(nn::round_up(moved, 16)));
-    m_most_kept = std::max(m_most_kept, coupling.kept.size());
+    m_most_inputs = std::max(m_most_inputs, static_cast<std::size_t>(coupling.nets[0].inputs()));
     m_most_moved = std::max(m_most_moved, coupling.moved.size());
     m_couplings.push_back(std::move(coupling));
   }
@@ -128,12 +148,17 @@ void Flow::pack(const float* parameters, Packed& packed, bool back) const {
 // Inference: v at the start, v now, inputs, heads, and what ResidualNet::infer needs.
 std::size_t Flow::scratch_count() const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), width = static_cast<std::size_t>(m_settings.width);
-  return (2 * dims + m_most_kept + 2 * m_most_moved + 2 * width) * kBlock;
+  return (2 * dims + m_most_inputs + 2 * m_most_moved + 2 * width) * kBlock;
+}
+
+void Flow::encode_kept(const Coupling& coupling, const float* v, float* x) const {
+  for (std::size_t k = 0; k < coupling.kept.size(); ++k)
+    encode(m_settings.bins, row(v, coupling.kept[k]), row(x, static_cast<int>(k) * encoded_rows(m_settings.bins)));
 }
 
 void Flow::condition(const Coupling& coupling, const Packed& packed, const float* v, float* x, float* scratch,
                      float* heads) const {
-  for (std::size_t k = 0; k < coupling.kept.size(); ++k) encode(row(v, coupling.kept[k]), row(x, k));
+  encode_kept(coupling, v, x);
   for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
     coupling.nets[n].infer(packed.forward.data() + coupling.packed[n], x, scratch, heads);
     heads += coupling.nets[n].outputs() * kBlock;
@@ -144,7 +169,7 @@ void Flow::forward(const Packed& packed, const double* z, double* y, double* log
   float* start = scratch;
   float* v = row(start, m_dims);
   float* x = row(v, m_dims);
-  float* heads = row(x, m_most_kept);
+  float* heads = row(x, m_most_inputs);
   float* rest = row(heads, 2 * m_most_moved);
   for (int i = 0; i < m_dims; ++i) logit(z + i * kBlock, row(start, i));
   std::copy_n(start, m_dims * kBlock, v);
@@ -163,7 +188,7 @@ void Flow::inverse(const Packed& packed, const double* y, double* z, double* log
   float* start = scratch;
   float* v = row(start, m_dims);
   float* x = row(v, m_dims);
-  float* heads = row(x, m_most_kept);
+  float* heads = row(x, m_most_inputs);
   float* rest = row(heads, 2 * m_most_moved);
   for (int i = 0; i < m_dims; ++i) logit(y + i * kBlock, row(start, i));
   std::copy_n(start, m_dims * kBlock, v);
@@ -182,7 +207,7 @@ void Flow::inverse(const Packed& packed, const double* y, double* z, double* log
 // and gradient, gradients of heads and v, weights, log q, and what ResidualNet::backward needs.
 std::size_t Flow::training_scratch_count() const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_kept)));
+  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   return m_activations + m_couplings[0].nets[0].scratch_count() +
          ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
 }
@@ -190,7 +215,7 @@ std::size_t Flow::training_scratch_count() const {
 double Flow::train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
                          bool accumulate, float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_kept)));
+  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };
   float* const v = take((couplings + 1) * dims);
   float* const d_v = take(dims);
@@ -216,7 +241,7 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
     const std::size_t moved = coupling.moved.size();
     float* h = heads + c * 2 * m_most_moved * kBlock;
     float* next = now - dims * kBlock;
-    for (std::size_t k = 0; k < coupling.kept.size(); ++k) encode(row(now, coupling.kept[k]), row(x, k));
+    encode_kept(coupling, now, x);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
       coupling.nets[n].forward(packed.forward.data() + coupling.packed[n], x, activations + coupling.activations[n],
                                row(h, n * moved));
@@ -245,6 +270,7 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
   for (std::size_t c = 0; c < couplings; ++c, now += dims * kBlock) {
     const Coupling& coupling = m_couplings[c];
     const std::size_t kept = coupling.kept.size(), moved = coupling.moved.size();
+    const std::size_t rows = static_cast<std::size_t>(encoded_rows(m_settings.bins));
     const float* h = heads + c * 2 * m_most_moved * kBlock;
     for (std::size_t k = 0; k < moved; ++k) {
       const std::size_t i = static_cast<std::size_t>(coupling.moved[k]);
@@ -254,14 +280,14 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
       float& sum = gradients[coupling.scales + k];
       sum = accumulate ? sum + d_scale : d_scale;
     }
-    for (std::size_t k = 0; k < kept; ++k) encode(row(now, coupling.kept[k]), row(x, k));
-    nn::transpose(static_cast<int>(kept), x, xt);
+    encode_kept(coupling, now, x);
+    nn::transpose(coupling.nets[0].inputs(), x, xt);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
       coupling.nets[n].backward(packed.back.data() + coupling.packed_back[n], xt, activations + coupling.activations[n],
                                 row(d_heads, n * moved), gradients + coupling.parameters[n], accumulate, d_x, n > 0,
                                 rest);
     for (std::size_t k = 0; k < kept; ++k)
-      encode_backward(row(now, coupling.kept[k]), row(d_x, k), row(d_v, coupling.kept[k]));
+      encode_backward(m_settings.bins, row(now, coupling.kept[k]), row(d_x, k * rows), row(d_v, coupling.kept[k]));
   }
   return loss;
 }

@@ -66,6 +66,9 @@ class Flow {
   double train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
                      bool accumulate, float* scratch) const;
 
+  /// What a coupling's networks see: v (dims x kBlock) -> x (inputs x kBlock).
+  void encode_kept(const Coupling& coupling, const float* v, float* x) const;
+
  private:
   /// Conditioner of one coupling: v (dims x kBlock) -> heads, |moved| rows of s and as many of t.
   void condition(const Coupling& coupling, const Packed& packed, const float* v, float* x, float* scratch,
@@ -75,7 +78,7 @@ class Flow {
   RealNvpSettings m_settings;
   std::vector<Coupling> m_couplings;
   std::size_t m_parameters = 0, m_packed = 0, m_packed_back = 0, m_activations = 0, m_scales = 0;
-  std::size_t m_most_kept = 0, m_most_moved = 0;
+  std::size_t m_most_inputs = 0, m_most_moved = 0;
 };
 
 }  // namespace warpath::realnvp

@@ -1,5 +1,6 @@
 #include "warp/realnvp_flow.h"
 
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "core/rng.h"
@@ -16,6 +17,7 @@ using Doubles = nn::AlignedVector<double>;
 struct Case {
   int dims;
   bool shared;
+  int bins;
   RealNvpSettings::Norm norm;
   double uniform;
   std::string target;
@@ -56,6 +58,8 @@ class FlowTest : public testing::TestWithParam<Case> {
     s.blocks = 1;
     s.shared = c.shared;
     s.norm = c.norm;
+    s.bins = c.bins;
+    s.masks = c.dims == 4 ? RealNvpSettings::Masks::alternating : RealNvpSettings::Masks::binary;
     return s;
   }
   Case m_case = GetParam();
@@ -75,12 +79,12 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   using Norm = RealNvpSettings::Norm;
   for (const std::string& target : nn::simd_targets()) {
-    all.push_back({1, false, Norm::actnorm, 0, target});
-    all.push_back({2, true, Norm::none, 0, target});
-    all.push_back({3, false, Norm::none, 0.1, target});
-    all.push_back({4, false, Norm::actnorm, 0, target});
-    all.push_back({5, true, Norm::actnorm, 0.3, target});
-    all.push_back({32, false, Norm::none, 0, target});
+    all.push_back({1, false, 0, Norm::actnorm, 0, target});
+    all.push_back({2, true, 0, Norm::none, 0, target});
+    all.push_back({3, false, 5, Norm::none, 0.1, target});
+    all.push_back({4, false, 0, Norm::actnorm, 0, target});
+    all.push_back({5, true, 16, Norm::actnorm, 0.3, target});
+    all.push_back({32, false, 0, Norm::none, 0, target});
   }
   return all;
 }
@@ -174,6 +178,41 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
           << view.name << "(" << r << ", " << c << ")";
     }
   EXPECT_LT(skipped, checked / 4) << "too many kinks for a test";
+}
+
+// Which dimensions each coupling keeps, as digits.
+std::vector<std::string> kept(int dims, int couplings, RealNvpSettings::Masks masks) {
+  RealNvpSettings s;
+  s.couplings = couplings;
+  s.masks = masks;
+  std::vector<std::string> names;
+  const Flow flow(dims, s);
+  for (const Coupling& c : flow.couplings()) names.push_back(fmt::format("{}", fmt::join(c.kept, "")));
+  return names;
+}
+
+TEST(Flow, Masks) {
+  using Names = std::vector<std::string>;
+  using Masks = RealNvpSettings::Masks;
+  EXPECT_EQ(kept(1, 2, Masks::binary), (Names{"", ""}));
+  EXPECT_EQ(kept(2, 4, Masks::binary), (Names{"0", "1", "0", "1"}));
+  EXPECT_EQ(kept(4, 4, Masks::alternating), (Names{"02", "13", "02", "13"}));
+  EXPECT_EQ(kept(4, 8, Masks::binary), (Names{"02", "13", "01", "23", "03", "12", "02", "13"}));
+  EXPECT_EQ(kept(3, 6, Masks::binary), (Names{"02", "1", "01", "2", "0", "12"}));
+  EXPECT_EQ(kept(8, 6, Masks::binary), (Names{"0246", "1357", "0145", "2367", "0123", "4567"}));
+}
+
+// No dimension may be without company on the kept side, or on the moved one.
+TEST(Flow, EverySplitHasTwoSides) {
+  for (int dims = 2; dims <= 32; ++dims) {
+    RealNvpSettings s;
+    s.couplings = 64;
+    const Flow flow(dims, s);
+    for (const Coupling& c : flow.couplings()) {
+      EXPECT_FALSE(c.kept.empty()) << dims;
+      EXPECT_FALSE(c.moved.empty()) << dims;
+    }
+  }
 }
 
 TEST(Flow, Settings) {

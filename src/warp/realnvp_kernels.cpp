@@ -48,19 +48,45 @@ void ShiftLogit(const double* z, const float* HWY_RESTRICT v0, const float* HWY_
   }
 }
 
-HWY_INLINE V Inside(V v, V x) {  // x where v is, else 0
-  return hn::IfThenElseZero(hn::Le(hn::Abs(v), hn::Set(d, kEdge)), x);
+HWY_INLINE V Clip(V v) { return hn::Max(hn::Min(v, hn::Set(d, kEdge)), hn::Set(d, -kEdge)); }
+HWY_INLINE V Sigmoid(V v) {
+  const V one = hn::Set(d, 1.0f);
+  return hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(v))));
 }
 
-void Encode(const float* HWY_RESTRICT v, float* HWY_RESTRICT x) {
-  const V edge = hn::Set(d, kEdge);
-  for (int i = 0; i < kBlock; i += kLanes)
-    hn::Store(hn::Max(hn::Min(hn::Load(d, v + i), edge), hn::Neg(edge)), d, x + i);
+void Encode(int bins, const float* HWY_RESTRICT v, float* HWY_RESTRICT x) {
+  const V one = hn::Set(d, 1.0f), scale = hn::Set(d, 1 / kBlobRadius);
+  for (int i = 0; i < kBlock; i += kLanes) {
+    const V clipped = Clip(hn::Load(d, v + i));
+    hn::Store(clipped, d, x + i);
+    if (bins == 0) continue;
+    V t = hn::Mul(hn::MulSub(Sigmoid(clipped), hn::Set(d, static_cast<float>(bins)), hn::Set(d, 0.5f)), scale);
+    for (int k = 1; k <= bins; ++k, t = hn::Sub(t, scale)) {
+      const V hat = hn::Max(hn::NegMulAdd(t, t, one), hn::Zero(d));
+      hn::Store(hn::Mul(hat, hat), d, x + k * kBlock + i);
+    }
+  }
 }
 
-void EncodeBackward(const float* HWY_RESTRICT v, const float* HWY_RESTRICT d_x, float* HWY_RESTRICT d_v) {
-  for (int i = 0; i < kBlock; i += kLanes)
-    hn::Store(hn::Add(hn::Load(d, d_v + i), Inside(hn::Load(d, v + i), hn::Load(d, d_x + i))), d, d_v + i);
+void EncodeBackward(int bins, const float* HWY_RESTRICT v, const float* HWY_RESTRICT d_x, float* HWY_RESTRICT d_v) {
+  const V one = hn::Set(d, 1.0f), scale = hn::Set(d, 1 / kBlobRadius);
+  for (int i = 0; i < kBlock; i += kLanes) {
+    const V x = hn::Load(d, v + i);
+    V sum = hn::Load(d, d_x + i);
+    if (bins > 0) {
+      const V u = Sigmoid(Clip(x));
+      V t = hn::Mul(hn::MulSub(u, hn::Set(d, static_cast<float>(bins)), hn::Set(d, 0.5f)), scale);
+      V d_t = hn::Zero(d);
+      for (int k = 1; k <= bins; ++k, t = hn::Sub(t, scale)) {
+        const V hat = hn::Max(hn::NegMulAdd(t, t, one), hn::Zero(d));
+        d_t = hn::MulAdd(hn::Mul(hat, t), hn::Load(d, d_x + k * kBlock + i), d_t);
+      }
+      const V du_dv = hn::Mul(u, hn::Sub(one, u));
+      sum = hn::MulAdd(hn::Mul(d_t, du_dv), hn::Set(d, -4.0f * static_cast<float>(bins) / kBlobRadius), sum);
+    }
+    const V inside = hn::IfThenElseZero(hn::Le(hn::Abs(x), hn::Set(d, kEdge)), sum);
+    hn::Store(hn::Add(hn::Load(d, d_v + i), inside), d, d_v + i);
+  }
 }
 
 HWY_INLINE void AddDoubles(const float* HWY_RESTRICT terms, double* HWY_RESTRICT sums) {
@@ -158,9 +184,9 @@ void logit(const double* z, float* v) { HWY_DYNAMIC_DISPATCH(Logit)(z, v); }
 void shift_logit(const double* z, const float* v0, const float* v1, double* y, double* log_det) {
   HWY_DYNAMIC_DISPATCH(ShiftLogit)(z, v0, v1, y, log_det);
 }
-void encode(const float* v, float* x) { HWY_DYNAMIC_DISPATCH(Encode)(v, x); }
-void encode_backward(const float* v, const float* d_x, float* d_v) {
-  HWY_DYNAMIC_DISPATCH(EncodeBackward)(v, d_x, d_v);
+void encode(int bins, const float* v, float* x) { HWY_DYNAMIC_DISPATCH(Encode)(bins, v, x); }
+void encode_backward(int bins, const float* v, const float* d_x, float* d_v) {
+  HWY_DYNAMIC_DISPATCH(EncodeBackward)(bins, v, d_x, d_v);
 }
 void couple(float a, const float* h_s, const float* h_t, float* v, double* log_det) {
   HWY_DYNAMIC_DISPATCH(Couple)(a, h_s, h_t, v, log_det);

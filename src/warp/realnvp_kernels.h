@@ -18,10 +18,14 @@ void logit(const double* z, float* v);
 /// ln dy/dz at constant v1 - v0 to log_det. Exactly the identity where v1 = v0; y may be the memory of z.
 void shift_logit(const double* z, const float* v0, const float* v1, double* y, double* log_det);
 
-/// What the networks see of a row: v, cut off at +-kEdge.
-void encode(const float* v, float* x);
+/// What the networks see of a row, encoded_rows(bins) rows: v, cut off at +-kEdge, and where u = sigmoid(v) lies among
+/// `bins` bins of [0,1): for each a biweight (1 - (t / kBlobRadius)^2)^2 of its distance t from u, in bins. Muller et
+/// al. have a Gaussian for that, the one-blob encoding [MMRGN19]; this one needs no exp and ends.
+inline constexpr float kBlobRadius = 2.0f;
+inline constexpr int encoded_rows(int bins) { return 1 + bins; }
+void encode(int bins, const float* v, float* x);
 /// d_v += d_x through encode.
-void encode_backward(const float* v, const float* d_x, float* d_v);
+void encode_backward(int bins, const float* v, const float* d_x, float* d_v);
 
 /// z -> y of one moved dimension, v' = v e^s + t with s = a tanh(h_s) and t = h_t; log_det += s.  [DSB17], [ZZ19]
 void couple(float a, const float* h_s, const float* h_t, float* v, double* log_det);

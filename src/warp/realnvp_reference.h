@@ -22,9 +22,14 @@ class Reference {
     for (std::size_t c = m_flow.couplings().size(); c-- > 0;) {
       const Coupling& coupling = m_flow.couplings()[c];
       std::vector<double> inputs, heads;
-      for (const int k : coupling.kept)
-        inputs.push_back(
-            std::clamp(v[static_cast<std::size_t>(k)], -static_cast<double>(kEdge), static_cast<double>(kEdge)));
+      for (const int k : coupling.kept) {
+        const double edge = static_cast<double>(kEdge), x = std::clamp(v[static_cast<std::size_t>(k)], -edge, edge);
+        inputs.push_back(x);
+        for (int bin = 0; bin < m_flow.settings().bins; ++bin) {
+          const double t = (m_flow.settings().bins / (1 + std::exp(-x)) - bin - 0.5) / static_cast<double>(kBlobRadius);
+          inputs.push_back(std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0);
+        }
+      }
       for (std::size_t n = 0; n < coupling.nets.size(); ++n)
         for (const double h : net(coupling.nets[n], coupling.parameters[n], inputs)) heads.push_back(h);
       const std::size_t moved = coupling.moved.size();
