@@ -10,7 +10,7 @@
 
 namespace warpath::nn {
 
-ResidualNet::ResidualNet(int inputs, int width, int blocks, int outputs, Norm norm) : m_width(width) {
+ResidualNet::ResidualNet(int inputs, int width, int blocks, int outputs, Norm norm) : m_width(width), m_norm(norm) {
   if (width < 16 || width % 16 != 0) throw ConfigError(fmt::format("width {}: must be a multiple of 16", width));
   if (blocks < 0) throw ConfigError(fmt::format("blocks {}: must not be negative", blocks));
   const int hidden = 1 + 2 * blocks;
@@ -25,6 +25,10 @@ ResidualNet::ResidualNet(int inputs, int width, int blocks, int outputs, Norm no
     layer.weight = take(m_parameters, layer.outputs * padded_inputs(layer.inputs));
     layer.bias = take(m_parameters, layer.outputs);
     if (layer.normalised) layer.gain = take(m_parameters, layer.outputs);
+    if (layer.normalised && norm == Norm::batch) {
+      layer.mean = take(m_parameters, layer.outputs);
+      layer.variance = take(m_parameters, layer.outputs);
+    }
     layer.packed = take(m_packed, packed_size(layer.inputs, layer.outputs));
     layer.packed_back = take(m_packed_back, packed_size(layer.outputs, layer.inputs));
     m_layers.push_back(layer);
@@ -48,19 +52,50 @@ void ResidualNet::initialise(float* parameters, std::uint64_t key, float last) c
         parameters[l.weight + static_cast<std::size_t>(o * padded_inputs(l.inputs) + k)] =
             scale * (2 * sample_float(key, counter++) - 1);
     if (l.normalised) std::fill_n(parameters + l.gain, l.outputs, 1.0f);
+    if (l.normalised && m_norm == Norm::batch) std::fill_n(parameters + l.variance, l.outputs, 1.0f);
   }
 }
 
+namespace {
+
+/// Gain and bias that a layer's normalisation comes to: y = gain * (V x) + bias.
+struct Folded {
+  std::vector<float> gain, bias;
+  Folded(const DenseLayer& l, Norm norm, const float* p)
+      : gain(static_cast<std::size_t>(l.outputs), 1.0f), bias(p + l.bias, p + l.bias + l.outputs) {
+    if (!l.normalised) return;
+    for (std::size_t o = 0; o < gain.size(); ++o) {
+      gain[o] = p[l.gain + o];
+      if (norm != Norm::batch) continue;
+      gain[o] /= std::sqrt(p[l.variance + o] + kBatchNormEpsilon);
+      bias[o] -= p[l.mean + o] * gain[o];
+    }
+  }
+};
+
+}  // namespace
+
 void ResidualNet::pack(const float* parameters, float* packed) const {
-  for (const DenseLayer& l : m_layers)
-    nn::pack(l.inputs, l.outputs, parameters + l.weight, l.normalised ? parameters + l.gain : nullptr,
-             parameters + l.bias, packed + l.packed);
+  for (const DenseLayer& l : m_layers) {
+    const Folded folded(l, m_norm, parameters);
+    nn::pack(l.inputs, l.outputs, parameters + l.weight, folded.gain.data(), folded.bias.data(), packed + l.packed);
+  }
 }
 
 void ResidualNet::pack_back(const float* parameters, float* packed_back) const {
-  for (const DenseLayer& l : m_layers)
-    pack_transposed(l.inputs, l.outputs, parameters + l.weight, l.normalised ? parameters + l.gain : nullptr,
-                    packed_back + l.packed_back);
+  for (const DenseLayer& l : m_layers) {
+    const Folded folded(l, m_norm, parameters);
+    pack_transposed(l.inputs, l.outputs, parameters + l.weight, folded.gain.data(), packed_back + l.packed_back);
+  }
+}
+
+void ResidualNet::pack_plain(const float* parameters, float* packed, float* packed_back) const {
+  const std::vector<float> zero(static_cast<std::size_t>(m_width), 0.0f);
+  for (const DenseLayer& l : m_layers) {
+    nn::pack(l.inputs, l.outputs, parameters + l.weight, nullptr, l.normalised ? zero.data() : parameters + l.bias,
+             packed + l.packed);
+    pack_transposed(l.inputs, l.outputs, parameters + l.weight, nullptr, packed_back + l.packed_back);
+  }
 }
 
 void ResidualNet::forward(const float* packed, const float* x, float* activations, float* out) const {
@@ -125,6 +160,7 @@ void ResidualNet::backward(const float* packed_back, const float* xt, const floa
 }
 
 void ResidualNet::unfold(const float* parameters, float* gradients) const {
+  if (m_norm != Norm::actnorm) return;
   for (const DenseLayer& l : m_layers) {
     if (!l.normalised) continue;
     const std::size_t stride = static_cast<std::size_t>(padded_inputs(l.inputs));

@@ -15,11 +15,15 @@ enum class Norm {
   batch,    ///< batch normalisation (Ioffe and Szegedy 2015); its statistics are folded in for use
 };
 
+/// Added to variances before their root is taken, as PyTorch has it.
+inline constexpr float kBatchNormEpsilon = 1e-5f;
+
 /// One dense layer's place in the network's parameters. Rows of the weights are padded_inputs(inputs) apart.
 struct DenseLayer {
   int inputs = 0, outputs = 0;
   std::size_t weight = 0, bias = 0;
-  std::size_t gain = 0;  ///< if normalised
+  std::size_t gain = 0;                ///< if normalised
+  std::size_t mean = 0, variance = 0;  ///< running statistics of batch normalisation; no gradient reaches them
   bool normalised = false;
   std::size_t packed = 0, packed_back = 0;  ///< place in the packed weights, and in the packed transposes
 };
@@ -35,6 +39,7 @@ class ResidualNet {
   int inputs() const { return m_layers.front().inputs; }
   int outputs() const { return m_layers.back().outputs; }
   int width() const { return m_width; }
+  Norm norm() const { return m_norm; }
   const std::vector<DenseLayer>& layers() const { return m_layers; }  ///< in, then pairs, then out
   std::size_t parameter_count() const { return m_parameters; }        ///< padding included; a multiple of 16
   std::size_t packed_count() const { return m_packed; }
@@ -48,8 +53,11 @@ class ResidualNet {
   /// `last`. `key` seeds them.
   void initialise(float* parameters, std::uint64_t key, float last) const;
 
+  /// Packs the weights with gains, and running statistics of batch normalisation, folded in.
   void pack(const float* parameters, float* packed) const;
   void pack_back(const float* parameters, float* packed_back) const;
+  /// Packs the weights of normalised layers as they are, without biases: what training with batch normalisation needs.
+  void pack_plain(const float* parameters, float* packed, float* packed_back) const;
 
   /// One block. x: inputs x kBlock; out: outputs x kBlock; activations: activation_count() floats, each layer's in
   /// turn.
@@ -64,11 +72,12 @@ class ResidualNet {
                 float* gradients, bool accumulate, float* d_x, bool accumulate_x, float* scratch) const;
   std::size_t scratch_count() const { return 3 * static_cast<std::size_t>(m_width * kBlock); }
 
-  /// Turns gradients of the folded weights W = gain * V into those of V and gain, in place.
+  /// Turns gradients of the folded weights W = gain * V into those of V and gain, in place (actnorm only).
   void unfold(const float* parameters, float* gradients) const;
 
  private:
   int m_width = 0;
+  Norm m_norm = Norm::none;
   std::vector<DenseLayer> m_layers;
   std::size_t m_parameters = 0, m_packed = 0, m_packed_back = 0;
 };

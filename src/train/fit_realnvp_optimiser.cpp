@@ -4,6 +4,8 @@
 #include <array>
 #include <numeric>
 
+#include "train/fit_realnvp_batch_norm.h"
+
 namespace warpath::realnvp {
 namespace {
 
@@ -15,9 +17,10 @@ constexpr std::size_t kSlots = 8;
 
 }  // namespace
 
-void ExampleBlocks::resize(std::size_t examples, std::size_t dimensions) {
+void ExampleBlocks::resize(std::size_t examples_, std::size_t dims_) {
+  examples = examples_;
   count = (examples + kBlock - 1) / kBlock;
-  dims = dimensions;
+  dims = dims_;
   y.assign(count * dims * kBlock, 0.5);
   weight.assign(count * kBlock, 0.0f);
 }
@@ -36,12 +39,26 @@ Optimiser::Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, doub
       m_gradients(kSlots * m_parameters.size(), 0.0f),
       m_m(m_parameters.size(), 0.0f),
       m_v(m_m),
-      m_scratch(kSlots, nn::AlignedVector<float>(flow.training_scratch_count())) {
+      m_scratch(kSlots) {
+  if (flow.settings().norm == RealNvpSettings::Norm::batch) return;  // it has numbers of its own for each step
+  for (auto& scratch : m_scratch) scratch.resize(flow.training_scratch_count());
   m_flow.pack(m_parameters.data(), m_packed, true);
 }
 
 double Optimiser::step(const ExampleBlocks& batch, double rate) {
   const std::size_t slots = std::min(kSlots, batch.count);
+  double loss = 0;
+  if (m_flow.settings().norm == RealNvpSettings::Norm::batch)
+    loss = batch_norm_step(m_flow, batch, m_parameters.data(), m_gradients.data(), slots);
+  else
+    loss = fused_pass(batch, slots);
+  ++m_step;
+  const nn::Adam adam{.rate = static_cast<float>(rate)};
+  parallel(m_flow.couplings().size(), [&](std::size_t c) { update(c, slots, adam); });
+  return loss;
+}
+
+double Optimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
   std::array<double, kSlots> loss{};
   parallel(slots, [&](std::size_t slot) {
     const std::size_t first = slot * batch.count / slots, end = (slot + 1) * batch.count / slots;
@@ -50,9 +67,6 @@ double Optimiser::step(const ExampleBlocks& batch, double rate) {
           m_flow.train_block(m_packed, batch.block_y(b), batch.block_weight(b), m_flow.settings().uniform,
                              m_gradients.data() + slot * m_parameters.size(), b > first, m_scratch[slot].data());
   });
-  ++m_step;
-  const nn::Adam adam{.rate = static_cast<float>(rate)};
-  parallel(m_flow.couplings().size(), [&](std::size_t c) { update(c, slots, adam); });
   return std::accumulate(loss.begin(), loss.end(), 0.0);
 }
 
@@ -71,7 +85,7 @@ void Optimiser::update(std::size_t c, std::size_t slots, const nn::Adam& adam) {
   // Young averages forget faster, so that the start has no part in them.
   const double decay = std::min(m_decay, m_step / (m_step + 10.0));
   nn::move_average(static_cast<float>(1 - decay), count, m_parameters.data() + from, m_average.data() + from);
-  m_flow.pack_coupling(c, m_parameters.data(), m_packed);
+  if (!m_packed.forward.empty()) m_flow.pack_coupling(c, m_parameters.data(), m_packed);
 }
 
 }  // namespace warpath::realnvp

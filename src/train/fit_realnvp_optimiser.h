@@ -13,11 +13,11 @@ namespace warpath::realnvp {
 
 /// Weighted examples as blocks of dims x nn::kBlock doubles; what is left of the last block weighs nothing.
 struct ExampleBlocks {
-  std::size_t count = 0, dims = 0;
+  std::size_t examples = 0, count = 0, dims = 0;  ///< count: of blocks
   nn::AlignedVector<double> y;
   nn::AlignedVector<float> weight;
 
-  void resize(std::size_t examples, std::size_t dimensions);
+  void resize(std::size_t examples_, std::size_t dims_);
   void set(std::size_t i, std::span<const float> example, float w);
   const double* block_y(std::size_t b) const { return y.data() + b * dims * nn::kBlock; }
   const float* block_weight(std::size_t b) const { return weight.data() + b * nn::kBlock; }
@@ -48,6 +48,8 @@ class Optimiser {
   int steps() const { return m_step; }
 
  private:
+  /// Gradients by Flow::train_block, each slot's blocks in turn; returns the loss.
+  double fused_pass(const ExampleBlocks& batch, std::size_t slots);
   void update(std::size_t coupling, std::size_t slots, const nn::Adam& adam);
 
   const Flow& m_flow;

@@ -147,6 +147,10 @@ std::shared_ptr<const RealNvp> RealNvp::load(const TensorFile& file, const std::
   }
   if (!std::all_of(parameters.begin(), parameters.end(), [](float p) { return std::isfinite(p); }))
     fail_load(file, prefix, "its weights are not all finite");
+  for (const realnvp::ParameterView& view : views)
+    if (view.name.ends_with("variance") &&
+        std::any_of(&parameters[view.offset], &parameters[view.offset] + view.rows, [](float v) { return v < 0; }))
+      fail_load(file, prefix, fmt::format("{} holds a negative variance", view.name));
   return std::make_shared<RealNvp>(std::move(flow), std::move(parameters));
 }
 

@@ -51,6 +51,22 @@ const float* row(const float* rows, int r) { return rows + static_cast<std::size
 
 }  // namespace
 
+double mixture_loss(const double* log_q, const float* weight, double uniform, float* d_weight) {
+  double loss = 0;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    d_weight[i] = weight[i];
+    if (weight[i] == 0) continue;
+    double log_density = log_q[i];
+    if (uniform > 0) {
+      const double q = (1 - uniform) * std::exp(std::min(log_q[i], 700.0));
+      log_density = std::log(q + uniform);
+      d_weight[i] *= static_cast<float>(q / (q + uniform));
+    }
+    loss -= static_cast<double>(weight[i]) * log_density;
+  }
+  return loss;
+}
+
 Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings(settings) {
   if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
   if (settings.bins < 0) throw ConfigError(fmt::format("bins {}: must not be negative", settings.bins));
@@ -94,7 +110,11 @@ std::vector<ParameterView> Flow::views() const {
         views.push_back({name + "weight", at + layer.weight, rows, cols,
                          static_cast<std::size_t>(nn::padded_inputs(layer.inputs))});
         views.push_back({name + "bias", at + layer.bias, rows, 1, 1});
-        if (layer.normalised) views.push_back({name + "gain", at + layer.gain, rows, 1, 1});
+        if (!layer.normalised) continue;
+        views.push_back({name + "gain", at + layer.gain, rows, 1, 1});
+        if (m_settings.norm != RealNvpSettings::Norm::batch) continue;
+        views.push_back({name + "mean", at + layer.mean, rows, 1, 1});
+        views.push_back({name + "variance", at + layer.variance, rows, 1, 1});
       }
     views.push_back({fmt::format("coupling{}.scale", c), coupling.scales, coupling.moved.size(), 1, 1});
   }
@@ -154,6 +174,12 @@ std::size_t Flow::scratch_count() const {
 void Flow::encode_kept(const Coupling& coupling, const float* v, float* x) const {
   for (std::size_t k = 0; k < coupling.kept.size(); ++k)
     encode(m_settings.bins, row(v, coupling.kept[k]), row(x, static_cast<int>(k) * encoded_rows(m_settings.bins)));
+}
+
+void Flow::encode_kept_backward(const Coupling& coupling, const float* v, const float* d_x, float* d_v) const {
+  for (std::size_t k = 0; k < coupling.kept.size(); ++k)
+    encode_backward(m_settings.bins, row(v, coupling.kept[k]),
+                    row(d_x, static_cast<int>(k) * encoded_rows(m_settings.bins)), row(d_v, coupling.kept[k]));
 }
 
 void Flow::condition(const Coupling& coupling, const Packed& packed, const float* v, float* x, float* scratch,
@@ -251,26 +277,12 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
   }
   for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(v, i), false, log_q);
 
-  // The mixture's density passes on the share of its gradient that is due to q.
-  double loss = 0;
-  for (std::size_t i = 0; i < kBlock; ++i) {
-    sample_weight[i] = weight[i];
-    if (weight[i] == 0) continue;
-    double log_density = log_q[i];
-    if (uniform > 0) {
-      const double q = (1 - uniform) * std::exp(std::min(log_q[i], 700.0));
-      log_density = std::log(q + uniform);
-      sample_weight[i] *= static_cast<float>(q / (q + uniform));
-    }
-    loss -= static_cast<double>(weight[i]) * log_density;
-  }
-
+  const double loss = mixture_loss(log_q, weight, uniform, sample_weight);
   for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(sample_weight, row(v, i), row(d_v, i));
   now = v + dims * kBlock;
   for (std::size_t c = 0; c < couplings; ++c, now += dims * kBlock) {
     const Coupling& coupling = m_couplings[c];
-    const std::size_t kept = coupling.kept.size(), moved = coupling.moved.size();
-    const std::size_t rows = static_cast<std::size_t>(encoded_rows(m_settings.bins));
+    const std::size_t moved = coupling.moved.size();
     const float* h = heads + c * 2 * m_most_moved * kBlock;
     for (std::size_t k = 0; k < moved; ++k) {
       const std::size_t i = static_cast<std::size_t>(coupling.moved[k]);
@@ -286,8 +298,7 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
       coupling.nets[n].backward(packed.back.data() + coupling.packed_back[n], xt, activations + coupling.activations[n],
                                 row(d_heads, n * moved), gradients + coupling.parameters[n], accumulate, d_x, n > 0,
                                 rest);
-    for (std::size_t k = 0; k < kept; ++k)
-      encode_backward(m_settings.bins, row(now, coupling.kept[k]), row(d_x, k * rows), row(d_v, coupling.kept[k]));
+    encode_kept_backward(coupling, now, d_x, d_v);
   }
   return loss;
 }

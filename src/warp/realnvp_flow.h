@@ -29,6 +29,10 @@ struct Packed {
   nn::AlignedVector<float> forward, back, scales;
 };
 
+/// Of one block: sum_i weight[i] * -ln((1 - uniform) q_i + uniform), and in d_weight each sample's share of the
+/// gradient with respect to -ln q_i.
+double mixture_loss(const double* log_q, const float* weight, double uniform, float* d_weight);
+
 /// The stack of couplings as arithmetic over blocks of nn::kBlock samples; it holds shapes, no parameters.
 class Flow {
  public:
@@ -68,6 +72,8 @@ class Flow {
 
   /// What a coupling's networks see: v (dims x kBlock) -> x (inputs x kBlock).
   void encode_kept(const Coupling& coupling, const float* v, float* x) const;
+  /// d_v += d_x through it.
+  void encode_kept_backward(const Coupling& coupling, const float* v, const float* d_x, float* d_v) const;
 
  private:
   /// Conditioner of one coupling: v (dims x kBlock) -> heads, |moved| rows of s and as many of t.

@@ -125,6 +125,16 @@ TEST(RealNvp, InstructionSetsAgree) {
   }
 }
 
+TEST(RealNvp, BatchStatisticsAreStored) {
+  const auto warp = bent(3, small(false, RealNvpSettings::Norm::batch));
+  TensorFile file;
+  warp->save(file, "");
+  EXPECT_EQ(std::dynamic_pointer_cast<const RealNvp>(load_proposal(file, ""))->parameters(), warp->parameters());
+  const std::vector<float> negative(16, -1.0f);
+  file.put<float>("coupling0.s.layer0.variance", {16}, negative);
+  EXPECT_THROW(load_proposal(file, ""), FileError);
+}
+
 TEST(RealNvp, BrokenFilesAreErrors) {
   TensorFile good;
   bent(2, small())->save(good, "w.");
