@@ -89,9 +89,10 @@ class Grower {
   /// of variation c has a relative error of c / sqrt(n): noisy values need more of them before they are believed,
   /// smooth ones hardly any.
   double shrinking_samples(const Tally& cell) const {
-    if (!(cell.sum > 0) || m_settings.shrink == 0) return 0;
-    constexpr double kLeast = 5;  // a few values may be alike by chance
-    return kLeast + m_settings.shrink * std::max(0.0, cell.count * cell.square / (cell.sum * cell.sum) - 1);
+    if (m_settings.shrink == 0) return 0;
+    constexpr double kLeast = 5;  // a few values, or zeros, may be alike by chance
+    const double square = cell.sum > 0 ? cell.count * cell.square / (cell.sum * cell.sum) - 1 : 0;
+    return kLeast + m_settings.shrink * std::max(0.0, square);
   }
 
   /// The mean in a part of a cell.
@@ -152,10 +153,11 @@ class Grower {
     Split best;
     for (std::size_t d = first_dim; d < end_dim; ++d) {
       const Tally* of_dim = &tallies[(d - first_dim) * bins];
-      Tally lower;
+      Tally all, lower;  // `all` in the order of `lower`, so that what is left of it is exact where no value is left
+      for (std::size_t b = 0; b < bins; ++b) all += of_dim[b];
       for (std::size_t b = 1; b < bins; ++b) {
         lower += of_dim[b - 1];
-        const Tally upper = whole - lower;
+        const Tally upper = all - lower;
         if (std::min(lower.count, upper.count) < m_settings.min_samples) continue;
         const double share = static_cast<double>(b) / static_cast<double>(bins);
         const auto at = static_cast<float>(box.low[d] + share * (static_cast<double>(box.high[d]) - box.low[d]));
