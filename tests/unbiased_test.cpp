@@ -85,6 +85,7 @@ struct Case {
   std::string family, dims;
   double uniform = 0.1;
 };
+void PrintTo(const Case& c, std::ostream* out) { *out << c.family << ":" << c.dims << ", uniform " << c.uniform; }
 class Unbiased : public testing::TestWithParam<Case> {};
 
 TEST_P(Unbiased, MeanIsThatOfPlainPathTracing) {

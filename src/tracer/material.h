@@ -10,9 +10,9 @@ namespace warpath {
 
 /// A point on a surface as the tracer finds it. World space.
 struct SurfacePoint {
-  Vec3 ng;            ///< geometric normal, unit, as the shape's orientation gives it (not turned towards wi)
-  Vec3 ns;            ///< shading normal, unit, likewise
-  Vec3 wi;            ///< unit, towards the previous vertex
+  Vec3 ng;  ///< geometric normal, unit, as the shape's orientation gives it (not turned towards wi)
+  Vec3 ns;  ///< shading normal, unit, likewise
+  Vec3 wi;  ///< unit, towards the previous vertex
   Vec2 uv;
   Vec3 dp_du, dp_dv;  ///< only where Materials::needs_tangents(bsdf), else undefined
   Vec3 dn_du, dn_dv;  ///< change of the shading normal with uv, likewise
@@ -22,10 +22,10 @@ struct SurfacePoint {
 };
 
 struct BsdfSample {
-  Vec3 wo;         ///< unit, world space
-  Color weight;    ///< f |cos| / pdf; 0 if sampling failed
-  float pdf = 0;   ///< solid angle, of all lobes that can make wo; 1 (times the lobe's probability) for a delta lobe
-  float eta = 1;   ///< relative index of refraction along wo, for roulette
+  Vec3 wo;        ///< unit, world space
+  Color weight;   ///< f |cos| / pdf; 0 if sampling failed
+  float pdf = 0;  ///< solid angle, of all lobes that can make wo; 1 (times the lobe's probability) for a delta lobe
+  float eta = 1;  ///< relative index of refraction along wo, for roulette
   bool delta = false;  ///< Mitsuba's Delta or Null: light sampling cannot make this direction
   bool null = false;   ///< passed straight through
 };
@@ -56,7 +56,8 @@ Color eval_pdf_bsdf(const Scatter& scatter, const Vec3& wo, float& pdf);
 BsdfSample sample_bsdf(const Scatter& scatter, float lobe, const Vec2& dir);
 /// Has it any lobe that light sampling can reach?
 bool is_smooth(const Scatter& scatter);
-/// For guiding and AOVs: approximate hemispherical reflectance (plus transmittance), roughness 0 (delta) to 1 (diffuse).
+/// For guiding and AOVs: approximate hemispherical reflectance (plus transmittance), roughness 0 (delta) to 1
+/// (diffuse).
 Color albedo(const Scatter& scatter);
 float roughness(const Scatter& scatter);
 SurfaceKind kind(const Scatter& scatter);
