@@ -84,11 +84,16 @@ void TrainingOptions::add_to(CLI::App& app) {
   const auto add_nvp = [&](const char* name, auto& value, const char* help) {
     return app.add_option(name, value, help)->group(kNvp)->capture_default_str();
   };
-  add_nvp("--architecture", m_architecture, "default, or released: the authors' 12 couplings of 512 x 8")
+  add_nvp("--architecture", m_architecture,
+          "default, or released: the authors' 12 couplings of 512 x 8, with their rate")
       ->check(CLI::IsMember({"default", "released"}));
   add_nvp("--couplings", settings.realnvp.couplings, "Coupling layers")->check(CLI::Range(1, 64));
   add_nvp("--width", settings.realnvp.width, "Neurons in each hidden layer")->check(CLI::Range(1, 1024));
   add_nvp("--blocks", settings.realnvp.blocks, "Residual blocks in each network")->check(CLI::Range(0, 64));
+  add_nvp("--encoding-bins", settings.realnvp.bins, "Bins of the one-blob encoding of what the networks see; 0: none")
+      ->check(CLI::Range(0, 256));
+  add_nvp("--masks", m_masks, "What a coupling moves: alternating dimensions, or binary, halves that change")
+      ->check(CLI::IsMember({"alternating", "binary"}));
   add_nvp("--bn", m_bn, "Normalisation: none, actnorm, or batch (as the paper has it)")
       ->check(CLI::IsMember({"none", "actnorm", "batch"}));
   add_nvp("--rate", settings.realnvp.rate, "Step size of Adam")->check(CLI::PositiveNumber);
@@ -101,6 +106,11 @@ void TrainingOptions::add_to(CLI::App& app) {
       ->group(kTree)
       ->capture_default_str()
       ->check(CLI::IsMember({"mean", "rms"}));
+  app.add_option("--kdtree-split", m_kdtree_split,
+                 "best, wherever a split gains most, or cyclic: dimensions in turn, as Guo et al. do")
+      ->group(kTree)
+      ->capture_default_str()
+      ->check(CLI::IsMember({"best", "cyclic"}));
   app.add_option("--leaves", settings.kdtree.max_leaves, "Leaves of the kd-tree at most")
       ->group(kTree)
       ->capture_default_str()
@@ -115,10 +125,17 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   TrainSettings result = settings;
   result.seed = seed;
   result.examples = examples ? examples : static_cast<std::uint64_t>(std::llround(epp * 200 * 160));
-  if (m_architecture == "released") result.realnvp = released_realnvp();
+  if (m_architecture == "released") {
+    result.realnvp = released_realnvp();
+    result.realnvp.batch = settings.realnvp.batch;
+    result.realnvp.max_steps = settings.realnvp.max_steps;
+  }
+  if (m_masks == "alternating") result.realnvp.masks = RealNvpSettings::Masks::alternating;
   if (m_bn == "none") result.realnvp.norm = RealNvpSettings::Norm::none;
   if (m_bn == "batch") result.realnvp.norm = RealNvpSettings::Norm::batch;
-  if (m_kdtree_target == "rms") result.kdtree.target = KdTreeSettings::Target::second_moment;
+  result.kdtree.target =
+      m_kdtree_target == "rms" ? KdTreeSettings::Target::second_moment : KdTreeSettings::Target::mean;
+  if (m_kdtree_split == "cyclic") result.kdtree.split = KdTreeSettings::Split::cyclic;
   return result;
 }
 

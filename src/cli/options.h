@@ -41,7 +41,8 @@ struct TrainingOptions {
   bool use_samples() const { return training_samples == "use"; }
 
  private:
-  std::string m_bn = "actnorm", m_kdtree_target = "mean", m_architecture = "default";
+  std::string m_bn = "actnorm", m_masks = "binary", m_architecture = "default";
+  std::string m_kdtree_target = "rms", m_kdtree_split = "best";
 };
 
 /// Options of commands that render.
