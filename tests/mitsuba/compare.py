@@ -167,7 +167,7 @@ def judge(ours, theirs):
     mean_agrees = bool((np.abs(difference) <= allowed + 1e-7).all())
     scale = 100 / np.maximum(np.abs(theirs.mean), 1e-6)
     text = "mean " + " ".join(f"{d:+.3f}" for d in difference * scale)
-    text += f" % (se {(error * scale).max():.3f})  bins {100 * within:6.2f} %  rms z {np.sqrt((z**2).mean()):.2f}"
+    text += f" % (se {(error * scale).max():.3f})  bins {100 * within:6.2f} %  rms z {np.sqrt((z[error_bins > floor] ** 2).mean()):.2f}"
     return mean_agrees and within >= BINS_WITHIN, text
 
 
