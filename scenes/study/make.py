@@ -193,7 +193,7 @@ def curtain():
 # Textures. Colours are as stored (sRGB).
 
 
-def floor_boards(x, y, size=512, boards=8):
+def floor_boards(x, y, size=256, boards=8):
     """Oak boards along v; each is cut from other wood."""
     u, v = x / size * boards, y / size
     board = int(u)
@@ -207,7 +207,7 @@ def floor_boards(x, y, size=512, boards=8):
     rings = 0.5 + 0.5 * math.sin(2 * math.pi * (3.0 * grain + 1.6 * knot))
     value = 0.35 * tone + 0.40 * rings + 0.25 * fine
     edge = min(u - board, board + 1 - u) * size / boards
-    gap = 1.0 if edge < 1.2 or min(along, 1 - along) * size / 2 < 1.2 else 0.0
+    gap = 1.0 if edge < 0.8 or min(along, 1 - along) * size / 2 < 0.8 else 0.0
     colour = mix((0.36, 0.235, 0.145), (0.60, 0.43, 0.285), round(value * 20) / 20)
     return mix(colour, (0.10, 0.065, 0.04), 0.85 * gap)
 
@@ -282,7 +282,7 @@ def main():
     for name, mesh in meshes.items():
         write_ply(models / f"{name}.ply", mesh)
     write_ply(models / "table_top.ply", top, uvs=True)
-    write_png(textures / "boards.png", 512, 512, floor_boards)
+    write_png(textures / "boards.png", 256, 256, floor_boards)
     write_png(textures / "walnut.png", 384, 256, walnut)
     write_png(textures / "print.png", 240, 300, warped_grid)
     write_hdr(textures / "dusk.hdr", 64, 32, dusk)
