@@ -183,13 +183,27 @@ void EmbreeScene::occluded(const RayStream& rays, std::size_t n, std::uint8_t* o
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-  alignas(64) int valid[kWidth];
-  RTCRay16 packet;
-  for (std::size_t first = 0; first < n; first += kWidth) {
-    const unsigned count = static_cast<unsigned>(std::min<std::size_t>(kWidth, n - first));
-    load_packet(rays, first, count, valid, packet);
-    rtcOccluded16(valid, m_impl->scene, &context, &packet);
-    for (unsigned i = 0; i < count; ++i) occluded[first + i] = packet.tfar[i] < 0;
+  constexpr std::size_t kStream = 256;
+  alignas(64) RTCRay stream[kStream];
+  for (std::size_t first = 0; first < n; first += kStream) {
+    const std::size_t count = std::min(kStream, n - first);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t k = first + i;
+      stream[i] = {rays.ox[k],
+                   rays.oy[k],
+                   rays.oz[k],
+                   0,
+                   rays.dx[k],
+                   rays.dy[k],
+                   rays.dz[k],
+                   rays.time[k],
+                   rays.t_max[k],
+                   ~0u,
+                   static_cast<unsigned>(i),
+                   0};
+    }
+    rtcOccluded1M(m_impl->scene, &context, stream, static_cast<unsigned>(count), sizeof(RTCRay));
+    for (std::size_t i = 0; i < count; ++i) occluded[first + i] = stream[i].tfar < 0;
   }
 }
 

@@ -20,6 +20,9 @@ constexpr float kEndless = std::numeric_limits<float>::max();
 constexpr float kMaxSurvival = 0.95f;
 constexpr std::uint32_t kLastBounce = 0xffff;  // what a Group can name
 
+// How many hits before its turn the data of a hit is asked for.
+constexpr std::size_t kTriangleAhead = 24, kVerticesAhead = 12;
+
 // Places of a bounce's numbers in VertexRecords::numbers.
 constexpr int kLight = 0, kLightUv = 1, kLobe = 3, kDir = 4, kRoulette = 6;
 
@@ -142,7 +145,11 @@ void PathLoop::resolve_hits(std::uint32_t bounce, Color* radiance, PathRecorder*
     radiance[lane] += w.beta.color(lane) * local * w.weight[lane];
     if (recorder) recorder->emission(lane, local);
   };
+  for (std::size_t i = 0; i < std::min(m_rays, kTriangleAhead); ++i) m_scene.surfaces.prefetch_triangle(w.hits, i);
   for (std::size_t i = 0; i < m_rays; ++i) {
+    // Vertices of hits lie all over memory: without this, most of the time here would be spent on waiting for them.
+    if (i + kTriangleAhead < m_rays) m_scene.surfaces.prefetch_triangle(w.hits, i + kTriangleAhead);
+    if (i + kVerticesAhead < m_rays) m_scene.surfaces.prefetch_vertices(w.hits, i + kVerticesAhead);
     const std::uint32_t lane = w.lanes[i], shape = w.hits.shape[i];
     if (shape == kNoHit) {
       if (!emits || !m_scene.emitters.has_environment()) continue;

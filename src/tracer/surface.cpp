@@ -74,6 +74,24 @@ Vec3 Surfaces::at(const HitStream& hits, std::size_t i, const RayStream& rays, S
   return surface.position;
 }
 
+void Surfaces::prefetch_triangle(const HitStream& hits, std::size_t i) const {
+  if (hits.shape[i] == kNoHit) return;
+  const Entry& shape = m_shapes[hits.shape[i]];
+  if (shape.mesh) __builtin_prefetch(shape.mesh->indices.data() + 3 * static_cast<std::size_t>(hits.primitive[i]));
+}
+
+void Surfaces::prefetch_vertices(const HitStream& hits, std::size_t i) const {
+  if (hits.shape[i] == kNoHit) return;
+  const Entry& shape = m_shapes[hits.shape[i]];
+  if (!shape.mesh) return;
+  const Mesh& mesh = *shape.mesh;
+  const std::uint32_t* index = mesh.indices.data() + 3 * static_cast<std::size_t>(hits.primitive[i]);
+  for (int k = 0; k < 3; ++k) {
+    if (!mesh.normals.empty()) __builtin_prefetch(mesh.normals.data() + index[k]);
+    if (shape.needs_uv && !mesh.uvs.empty()) __builtin_prefetch(mesh.uvs.data() + index[k]);
+  }
+}
+
 void Surfaces::mesh_at(const Entry& shape, std::uint32_t primitive, float u, float v, float time,
                        SurfacePoint& point) const {
   const Mesh& mesh = *shape.mesh;

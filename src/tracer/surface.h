@@ -19,6 +19,10 @@ class Surfaces {
   /// where the shape's BSDF or emitter needs them.
   Vec3 at(const HitStream& hits, std::size_t i, const RayStream& rays, SurfacePoint& point) const;
 
+  /// Starts loading what at() will read for hit i: first the triangle, and when that is there its vertices.
+  void prefetch_triangle(const HitStream& hits, std::size_t i) const;
+  void prefetch_vertices(const HitStream& hits, std::size_t i) const;
+
   BsdfId bsdf(std::uint32_t shape) const { return m_shapes[shape].bsdf; }
   std::int32_t emitter(std::uint32_t shape) const { return m_shapes[shape].emitter; }
   /// analytic()[i] is shape i if that is a sphere, disk or cylinder, else null.
