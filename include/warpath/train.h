@@ -12,24 +12,28 @@ namespace warpath {
 struct RealNvpSettings {
   int couplings = 16;
   int width = 32;
-  int blocks = 1;       ///< residual blocks of two dense layers in each of s and t
-  int bins = 15;        ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
-  bool shared = false;  ///< s and t from one network with two heads
+  int blocks = 1;      ///< residual blocks of two dense layers in each of s and t
+  int bins = 15;       ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
+  bool shared = true;  ///< s and t from one network with two heads; the paper has two
   /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that
   /// any two dimensions come to stand on different sides.
   enum class Masks { alternating, binary } masks = Masks::binary;
   enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
-  double rate = 1e-3;  ///< Adam's step size (at its peak, where a schedule shapes it)
+  /// What training minimises: -ln q, the paper's maximum likelihood; or the variance of the estimate g / q, by way of
+  /// ln E[g / q] over examples that were drawn by g, with q mixed with `uniform`. The second one mends the tails.
+  enum class Loss { likelihood, variance } loss = Loss::variance;
+  double rate = 6e-3;  ///< Adam's step size at the start; it falls when the held-out loss no longer does
   int batch = 2000;
-  int max_steps = 3000;      ///< training ends sooner, when the held-out likelihood no longer rises
+  int max_steps = 3000;      ///< training ends sooner, when the held-out loss no longer falls
   double held_out = 0.05;    ///< share of the examples that is never trained on
-  double uniform = 0.0;      ///< trains the density (1 - uniform) q + uniform that a mixture will have, instead of q
+  double uniform = 0.1;      ///< share of uniform samples that Loss::variance counts on
   double average = 0.99;     ///< decay per step of the moving average of the weights that is handed out; 0 for none
-  int evaluate_every = 100;  ///< steps between evaluations of the held-out likelihood
+  int evaluate_every = 100;  ///< steps between evaluations of the held-out loss
   int patience = 3;    ///< evaluations without gain, after which the rate falls to a third, and at last training ends
   int rate_drops = 2;  ///< how often the rate falls
 };
-/// The architecture that the authors of [ZZ19] released: 12 couplings, separate s and t, 512 wide, 8 blocks, rate 1e-4.
+/// The architecture that the authors of [ZZ19] released, and their training: 12 couplings, separate s and t, 512 wide,
+/// 8 blocks, maximum likelihood at rate 1e-4.
 RealNvpSettings released_realnvp();
 
 struct KdTreeSettings {
@@ -63,8 +67,8 @@ struct TrainLog {
   struct Point {
     double seconds;         ///< since training began
     std::uint64_t samples;  ///< examples seen, with repetition
-    double loss;            ///< mean -ln q over the last training batches
-    double held_out;        ///< mean -ln q over the examples held out
+    double loss;            ///< mean -ln q over the last training batches; with Loss::variance, ln E[g / q]
+    double held_out;        ///< the same over the examples held out
   };
   std::vector<Point> points;
   double seconds = 0;

@@ -24,6 +24,8 @@ RealNvpSettings released_realnvp() {
   s.blocks = 8;
   s.rate = 1e-4;
   s.bins = 0;
+  s.shared = false;
+  s.loss = RealNvpSettings::Loss::likelihood;
   s.masks = RealNvpSettings::Masks::alternating;
   s.norm = RealNvpSettings::Norm::batch;
   return s;
@@ -66,6 +68,9 @@ class Trainer {
   Floats start_from(const Proposal& init) const;
   void initialise_norms(Floats& parameters) const;
   void next_batch();
+  float weight(std::size_t i) const { return m_examples.weight.empty() ? 1.0f : m_examples.weight[i]; }
+  /// g, up to a factor that is the same for all: weight times the density that the example was drawn from.
+  float target(std::size_t i) const { return m_examples.inv_q.empty() ? weight(i) : weight(i) / m_examples.inv_q[i]; }
   double held_out_loss(const Floats& parameters);
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - m_start).count(); }
 
@@ -93,7 +98,6 @@ Trainer::Trainer(const Examples& examples, const RealNvpSettings& settings, std:
 
   // The last rows are held out: copies of one candidate are adjacent, and must not stand on both sides.
   const std::size_t trained = count - held_out;
-  const auto weight = [&](std::size_t i) { return examples.weight.empty() ? 1.0f : examples.weight[i]; };
   std::vector<std::uint32_t> rest;
   for (std::size_t i = 0; i < trained; ++i) {
     if (!(weight(i) > 0)) continue;
@@ -102,7 +106,7 @@ Trainer::Trainer(const Examples& examples, const RealNvpSettings& settings, std:
   }
   m_held_out.resize(held_out, dims);
   for (std::size_t i = trained; i < count; ++i) {
-    m_held_out.set(i - trained, examples.y.batch().row(i), weight(i));
+    m_held_out.set(i - trained, examples.y.batch().row(i), weight(i), target(i));
     m_held_out_weight += static_cast<double>(weight(i));
   }
   if (rest.empty() || !(m_held_out_weight > 0)) throw ConfigError("no example has any weight: nothing to train on");
@@ -153,33 +157,28 @@ void Trainer::next_batch() {
   const double scale = 1 / (m_mean_weight * m_settings.batch);
   for (std::size_t i = 0; i < static_cast<std::size_t>(m_settings.batch); ++i) {
     const std::uint32_t e = m_shuffle->next();
-    const double weight = m_examples.weight.empty() ? 1.0 : static_cast<double>(m_examples.weight[e]);
-    m_batch.set(i, m_examples.y.batch().row(e), static_cast<float>(weight * scale));
+    m_batch.set(i, m_examples.y.batch().row(e), static_cast<float>(static_cast<double>(weight(e)) * scale), target(e));
   }
 }
 
 double Trainer::held_out_loss(const Floats& parameters) {
+  // No part of the loss is cut off here.
+  const realnvp::Objective objective{m_settings.loss, m_settings.uniform, 1e30};
   realnvp::Packed packed;
   m_flow.pack(parameters.data(), packed, false);
   std::vector<double> sums(m_held_out.count);
   const std::size_t chunk = 8, chunks = (m_held_out.count + chunk - 1) / chunk;
   parallel(chunks, [&](std::size_t i) {
     Floats scratch(m_flow.scratch_count());
+    Floats d(kBlock);
     Doubles z(m_held_out.dims * kBlock), log_q(kBlock);
     for (std::size_t b = i * chunk; b < std::min(m_held_out.count, (i + 1) * chunk); ++b) {
       m_flow.inverse(packed, m_held_out.block_y(b), z.data(), log_q.data(), scratch.data());
-      for (std::size_t s = 0; s < kBlock; ++s) {
-        const double weight = static_cast<double>(m_held_out.block_weight(b)[s]);
-        if (weight == 0) continue;
-        const double density =
-            m_settings.uniform > 0
-                ? std::log((1 - m_settings.uniform) * std::exp(std::min(log_q[s], 700.0)) + m_settings.uniform)
-                : log_q[s];
-        sums[b] -= weight * density;
-      }
+      sums[b] = block_loss(objective, log_q.data(), m_held_out.block_weight(b), m_held_out.block_target(b), d.data());
     }
   });
-  return std::accumulate(sums.begin(), sums.end(), 0.0) / m_held_out_weight;
+  const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / m_held_out_weight;
+  return m_settings.loss == RealNvpSettings::Loss::variance ? std::log(mean) : mean;
 }
 
 Fit Trainer::run() {
@@ -209,7 +208,7 @@ Fit Trainer::run() {
       best_parameters = m_optimiser->averaged();
     } else if (++bad >= m_settings.patience) {
       if (drops++ >= m_settings.rate_drops) {
-        fit.log.stopped = "held-out likelihood no longer rises";
+        fit.log.stopped = "held-out loss no longer falls";
         break;
       }
       rate /= 3;

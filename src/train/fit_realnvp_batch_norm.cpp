@@ -190,8 +190,8 @@ void BatchNormPass::backward(const float* parameters, const float* x, const floa
   }
 }
 
-double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, float* parameters, float* gradients,
-                       std::size_t slots) {
+double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objective& objective, float* parameters,
+                       float* gradients, std::size_t slots) {
   const std::size_t dims = batch.dims, blocks = batch.count, couplings = flow.couplings().size();
   const std::size_t state = dims * kBlock;
   const auto row = [](float* rows, std::size_t r) { return rows + r * kBlock; };
@@ -241,7 +241,7 @@ double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, float* para
   parallel(blocks, [&](std::size_t b) {
     float* w = weight.data() + b * kBlock;
     for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(at(0, b), i), false, log_q.data() + b * kBlock);
-    loss[b] = mixture_loss(log_q.data() + b * kBlock, batch.block_weight(b), flow.settings().uniform, w);
+    loss[b] = block_loss(objective, log_q.data() + b * kBlock, batch.block_weight(b), batch.block_target(b), w);
     for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(w, row(at(0, b), i), row(d_v.data() + b * state, i));
   });
 

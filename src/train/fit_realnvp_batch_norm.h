@@ -36,7 +36,7 @@ class BatchNormPass {
 
 /// The loss of Flow::train_block and its gradients over a whole batch, for flows with batch normalisation. Running
 /// statistics in `parameters` are moved. gradients: `slots` arrays, parameter_count() apart, that sum up to them.
-double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, float* parameters, float* gradients,
-                       std::size_t slots);
+double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objective& objective, float* parameters,
+                       float* gradients, std::size_t slots);
 
 }  // namespace warpath::realnvp

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include "train/fit_realnvp_batch_norm.h"
@@ -15,6 +16,14 @@ using nn::kBlock;
 /// depend on threads. More would cost memory traffic, fewer would leave threads idle.
 constexpr std::size_t kSlots = 8;
 
+/// E[g / q] starts near E[g], because q is 1 at the start.
+Objective initial_objective(const RealNvpSettings& settings, const ExampleBlocks& batch) {
+  double scale = 0;
+  for (std::size_t i = 0; i < batch.examples; ++i)
+    scale += static_cast<double>(batch.weight[i]) * static_cast<double>(batch.target[i]);
+  return {settings.loss, settings.uniform, std::max(scale, 1e-30)};
+}
+
 }  // namespace
 
 void ExampleBlocks::resize(std::size_t examples_, std::size_t dims_) {
@@ -23,12 +32,14 @@ void ExampleBlocks::resize(std::size_t examples_, std::size_t dims_) {
   dims = dims_;
   y.assign(count * dims * kBlock, 0.5);
   weight.assign(count * kBlock, 0.0f);
+  target = weight;
 }
 
-void ExampleBlocks::set(std::size_t i, std::span<const float> example, float w) {
+void ExampleBlocks::set(std::size_t i, std::span<const float> example, float w, float g) {
   const std::size_t block = i / kBlock, lane = i % kBlock;
   for (std::size_t d = 0; d < dims; ++d) y[(block * dims + d) * kBlock + lane] = static_cast<double>(example[d]);
   weight[i] = w;
+  target[i] = g;
 }
 
 Optimiser::Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average)
@@ -47,15 +58,17 @@ Optimiser::Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, doub
 
 double Optimiser::step(const ExampleBlocks& batch, double rate) {
   const std::size_t slots = std::min(kSlots, batch.count);
-  double loss = 0;
-  if (m_flow.settings().norm == RealNvpSettings::Norm::batch)
-    loss = batch_norm_step(m_flow, batch, m_parameters.data(), m_gradients.data(), slots);
-  else
-    loss = fused_pass(batch, slots);
+  if (m_step == 0) m_objective = initial_objective(m_flow.settings(), batch);
+  const bool fused = m_flow.settings().norm != RealNvpSettings::Norm::batch;
+  const double loss = fused
+                          ? fused_pass(batch, slots)
+                          : batch_norm_step(m_flow, batch, m_objective, m_parameters.data(), m_gradients.data(), slots);
   ++m_step;
   const nn::Adam adam{.rate = static_cast<float>(rate)};
   parallel(m_flow.couplings().size(), [&](std::size_t c) { update(c, slots, adam); });
-  return loss;
+  if (m_objective.loss == RealNvpSettings::Loss::likelihood) return loss;
+  m_objective.scale += 0.05 * (loss - m_objective.scale);
+  return std::log(loss);
 }
 
 double Optimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
@@ -64,7 +77,7 @@ double Optimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
     const std::size_t first = slot * batch.count / slots, end = (slot + 1) * batch.count / slots;
     for (std::size_t b = first; b < end; ++b)
       loss[slot] +=
-          m_flow.train_block(m_packed, batch.block_y(b), batch.block_weight(b), m_flow.settings().uniform,
+          m_flow.train_block(m_packed, batch.block_y(b), batch.block_weight(b), batch.block_target(b), m_objective,
                              m_gradients.data() + slot * m_parameters.size(), b > first, m_scratch[slot].data());
   });
   return std::accumulate(loss.begin(), loss.end(), 0.0);

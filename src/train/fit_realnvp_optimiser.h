@@ -15,12 +15,13 @@ namespace warpath::realnvp {
 struct ExampleBlocks {
   std::size_t examples = 0, count = 0, dims = 0;  ///< count: of blocks
   nn::AlignedVector<double> y;
-  nn::AlignedVector<float> weight;
+  nn::AlignedVector<float> weight, target;  ///< target: g, in units of its mean over all candidates
 
   void resize(std::size_t examples_, std::size_t dims_);
-  void set(std::size_t i, std::span<const float> example, float w);
+  void set(std::size_t i, std::span<const float> example, float w, float g);
   const double* block_y(std::size_t b) const { return y.data() + b * dims * nn::kBlock; }
   const float* block_weight(std::size_t b) const { return weight.data() + b * nn::kBlock; }
+  const float* block_target(std::size_t b) const { return target.data() + b * nn::kBlock; }
 };
 
 /// body(i) for i in [0, count), on all threads, one i at a time, denormals flushed.
@@ -40,7 +41,8 @@ class Optimiser {
   /// `average`: decay per step of the moving average of the parameters.
   Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average);
 
-  /// One step of Adam on the loss sum_i weight[i] * -ln(q(y_i)), see Flow::train_block. Returns the loss before it.
+  /// One step of Adam on the loss that the flow's settings name; weights must sum up to 1. Returns the loss before it,
+  /// ln E[g / q] for Loss::variance.
   double step(const ExampleBlocks& batch, double rate);
 
   const nn::AlignedVector<float>& parameters() const { return m_parameters; }
@@ -55,6 +57,7 @@ class Optimiser {
   const Flow& m_flow;
   double m_decay;
   int m_step = 0;
+  Objective m_objective;
   nn::AlignedVector<float> m_parameters, m_average, m_gradients, m_m, m_v;
   Packed m_packed;
   std::vector<nn::AlignedVector<float>> m_scratch;  ///< one for each slot

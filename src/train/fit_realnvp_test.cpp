@@ -25,6 +25,8 @@ RealNvpSettings small() {
   s.width = 16;
   s.batch = 500;
   s.rate = 5e-3;
+  s.shared = false;
+  s.loss = RealNvpSettings::Loss::likelihood;
   s.max_steps = 150;
   s.evaluate_every = 25;
   return s;
@@ -55,6 +57,7 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     s.width = run.at("width");
     s.blocks = run.at("blocks");
     s.shared = run.at("shared");
+    s.loss = RealNvpSettings::Loss::likelihood;
     s.bins = 0;
     s.masks = RealNvpSettings::Masks::alternating;
     const std::string norm = run.at("norm");
@@ -81,7 +84,7 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     realnvp::ExampleBlocks batch;
     batch.resize(count, dims);
     for (std::size_t i = 0; i < count; ++i)
-      batch.set(i, std::span(y).subspan(i * dims, dims), 1.0f / static_cast<float>(count));
+      batch.set(i, std::span(y).subspan(i * dims, dims), 1.0f / static_cast<float>(count), 0.0f);
     realnvp::Optimiser optimiser(flow, parameters, 0.99);
     for (const double loss : run.at("loss"))
       EXPECT_NEAR(optimiser.step(batch, run.at("rate")), loss, 2e-5 * (1 + std::abs(loss)));
@@ -150,7 +153,7 @@ TEST(FitRealNvp, BatchNormalisationLearnsAndIsFolded) {
   EXPECT_EQ(check_proposal(*fit.proposal, options), "");
 }
 
-TEST(FitRealNvp, StopsWhenTheHeldOutLikelihoodNoLongerRises) {
+TEST(FitRealNvp, StopsWhenTheHeldOutLossNoLongerFalls) {
   Examples noise{Matrix<float>(2'000, 2), std::vector<float>(2'000, 1.0f), {}};
   for (std::size_t i = 0; i < noise.y.values().size(); ++i)
     noise.y.values()[i] = sample_float(1, static_cast<std::uint32_t>(i));
@@ -158,7 +161,7 @@ TEST(FitRealNvp, StopsWhenTheHeldOutLikelihoodNoLongerRises) {
   s.evaluate_every = 5;
   s.max_steps = 100'000;
   const Fit fit = fit_realnvp(noise, s, 1);
-  EXPECT_EQ(fit.log.stopped, "held-out likelihood no longer rises");
+  EXPECT_EQ(fit.log.stopped, "held-out loss no longer falls");
   EXPECT_LT(fit.log.points.size(), 2'000u);
 }
 
@@ -185,13 +188,32 @@ TEST(FitRealNvp, StartsFromSavedWeights) {
   EXPECT_THROW(fit_realnvp(examples, s, 1, std::make_unique<Uniform>(2).get()), ConfigError);
 }
 
-TEST(FitRealNvp, TrainsTheDensityOfTheMixture) {
+// Examples drawn by g, with g known: E[g / q] is 1 where q = g, E[g] where q = 1.
+TEST(FitRealNvp, LowersTheVariance) {
+  Examples examples = ramp(1, 20'000);
+  for (std::size_t i = 0; i < examples.size(); ++i) examples.inv_q.push_back(1 / std::max(2 * examples.y(i, 0), 1e-3f));
   RealNvpSettings s = small();
-  s.uniform = 0.5;
+  s.loss = RealNvpSettings::Loss::variance;
+  s.uniform = 0.05;
   s.max_steps = 400;
-  const double held_out = fit_realnvp(ramp(1, 20'000), s, 1).log.points.back().held_out;
-  EXPECT_LT(held_out, -0.1);
-  EXPECT_GT(held_out, -(std::log(2.0) - 0.5) - 0.02);
+  const auto& points = fit_realnvp(examples, s, 1).log.points;
+  EXPECT_NEAR(points.front().held_out, std::log(4.0 / 3), 0.02);
+  EXPECT_LT(points.back().held_out, 0.1);
+  EXPECT_GT(points.back().held_out, 0 - 0.03);
+}
+
+// A few of a thousand times the others' brightness that say nothing about y must not throw the density about.
+TEST(FitRealNvp, RareBrightExamplesDoNotRule) {
+  Examples examples = ramp(1, 20'000);
+  for (std::size_t i = 0; i < examples.size(); ++i) examples.inv_q.push_back(i % 1000 == 17 ? 1e-3f : 1.0f);
+  RealNvpSettings s = small();
+  s.loss = RealNvpSettings::Loss::variance;
+  const Fit fit = fit_realnvp(examples, s, 1);
+  std::vector<double> log_q(99);
+  Matrix<double> y(99, 1);
+  for (std::size_t i = 0; i < 99; ++i) y(i, 0) = static_cast<double>(i + 1) / 100;
+  fit.proposal->log_density(y.batch(), log_q);
+  for (const double l : log_q) EXPECT_LT(std::abs(l), 3);
 }
 
 TEST(FitRealNvp, EndsWhenInterrupted) {

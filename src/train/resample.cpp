@@ -38,8 +38,13 @@ Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64
   if (!(total > 0)) return {};
 
   const auto dims = static_cast<std::size_t>(candidates.layout.dims());
-  Examples examples{Matrix<float>(count, dims), std::vector<float>(count, 1.0f), {}};
+  Examples examples{Matrix<float>(count, dims), std::vector<float>(count, 1.0f), std::vector<float>(count)};
   const double step = total / static_cast<double>(count);
+  const double mean = total / static_cast<double>(candidates.size());
+  const auto take = [&](std::size_t candidate, std::uint64_t k) {
+    candidates.primary_sample(candidate, &examples.y(k, 0));
+    examples.inv_q[k] = static_cast<float>(mean / static_cast<double>(candidates.target[candidate]));
+  };
   const std::uint64_t stream = mix64(seed);
   const auto point = [&](std::uint64_t k) {
     return (static_cast<double>(k) + sample_double(sample_key(stream, k), 0)) * step;
@@ -62,9 +67,9 @@ Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64
       if (!(candidates.target[i] > 0)) continue;
       sum += candidates.target[i];
       chosen = i;
-      for (; k < last && point(k) - starts[block] < sum; ++k) candidates.primary_sample(i, &examples.y(k, 0));
+      for (; k < last && point(k) - starts[block] < sum; ++k) take(i, k);
     }
-    for (; k < last; ++k) candidates.primary_sample(chosen, &examples.y(k, 0));
+    for (; k < last; ++k) take(chosen, k);
   });
   return examples;
 }

@@ -5,7 +5,8 @@ namespace warpath {
 
 /// Sample-importance resampling [TCE05]: `count` examples drawn from the candidates with probability proportional to g,
 /// so that they follow the density of g. Stratified: example k lies at (k + u_k) / count of the running sum, so that a
-/// candidate's number of copies is within two of its expectation. Weights are 1. Rows stand in the order of the
+/// candidate's number of copies is within two of its expectation. Weights are 1,
+/// inv_q is mean g / g. Rows stand in the order of the
 /// candidates: copies of one are adjacent (a bright candidate has many, and all of them say the same: hold out whole
 /// ranges of rows, or a fit is judged by what it was fitted to), and a minibatch must be shuffled by who takes it.
 /// Empty if no candidate has g > 0. Sums are in double, and the same for any number of threads.

@@ -108,7 +108,9 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
     const auto start = std::chrono::steady_clock::now();
     const Examples examples = resample(candidates, settings.examples, mix64(settings.seed + 1));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    fit = fit_realnvp(examples, settings.realnvp, settings.seed, init);
+    RealNvpSettings realnvp = settings.realnvp;
+    realnvp.uniform = settings.uniform;
+    fit = fit_realnvp(examples, realnvp, settings.seed, init);
     fit.log.seconds += seconds;
   } else {
     fit = fit_to_candidates(candidates, settings, init);

@@ -51,18 +51,21 @@ const float* row(const float* rows, int r) { return rows + static_cast<std::size
 
 }  // namespace
 
-double mixture_loss(const double* log_q, const float* weight, double uniform, float* d_weight) {
+double block_loss(const Objective& objective, const double* log_q, const float* weight, const float* target,
+                  float* d_log_q) {
   double loss = 0;
   for (std::size_t i = 0; i < kBlock; ++i) {
-    d_weight[i] = weight[i];
+    d_log_q[i] = weight[i];
     if (weight[i] == 0) continue;
-    double log_density = log_q[i];
-    if (uniform > 0) {
-      const double q = (1 - uniform) * std::exp(std::min(log_q[i], 700.0));
-      log_density = std::log(q + uniform);
-      d_weight[i] *= static_cast<float>(q / (q + uniform));
+    const double w = static_cast<double>(weight[i]);
+    if (objective.loss == RealNvpSettings::Loss::likelihood) {
+      loss -= w * log_q[i];
+      continue;
     }
-    loss -= static_cast<double>(weight[i]) * log_density;
+    const double q = (1 - objective.uniform) * std::exp(std::min(log_q[i], 700.0)), mixed = q + objective.uniform;
+    const double term = std::min(static_cast<double>(target[i]) / mixed, kMostWeight * objective.scale);
+    loss += w * term;
+    d_log_q[i] *= static_cast<float>(term / objective.scale * (q / mixed));
   }
   return loss;
 }
@@ -238,8 +241,8 @@ std::size_t Flow::training_scratch_count() const {
          ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
 }
 
-double Flow::train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
-                         bool accumulate, float* scratch) const {
+double Flow::train_block(const Packed& packed, const double* y, const float* weight, const float* target,
+                         const Objective& objective, float* gradients, bool accumulate, float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
   const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };
@@ -277,7 +280,7 @@ double Flow::train_block(const Packed& packed, const double* y, const float* wei
   }
   for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(v, i), false, log_q);
 
-  const double loss = mixture_loss(log_q, weight, uniform, sample_weight);
+  const double loss = block_loss(objective, log_q, weight, target, sample_weight);
   for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(sample_weight, row(v, i), row(d_v, i));
   now = v + dims * kBlock;
   for (std::size_t c = 0; c < couplings; ++c, now += dims * kBlock) {

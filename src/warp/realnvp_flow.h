@@ -29,9 +29,21 @@ struct Packed {
   nn::AlignedVector<float> forward, back, scales;
 };
 
-/// Of one block: sum_i weight[i] * -ln((1 - uniform) q_i + uniform), and in d_weight each sample's share of the
-/// gradient with respect to -ln q_i.
-double mixture_loss(const double* log_q, const float* weight, double uniform, float* d_weight);
+/// What a step of training minimises, see RealNvpSettings::Loss.
+struct Objective {
+  RealNvpSettings::Loss loss = RealNvpSettings::Loss::likelihood;
+  double uniform = 0;  ///< variance only: q stands for (1 - uniform) q + uniform
+  double scale = 1;    ///< variance only: about E[g / q]; the gradient is that of the loss over it
+};
+
+/// One example weighs no more in the gradient of the variance than so many average ones: rare bright paths would throw
+/// the weights about.
+inline constexpr double kMostWeight = 10;
+
+/// The loss summed over one block: of weight[i] * -ln q_i, or of weight[i] * target[i] / q_i, each example's part of it
+/// cut off at kMostWeight * scale. d_log_q: its derivative with respect to -ln q_i (divided by scale).
+double block_loss(const Objective& objective, const double* log_q, const float* weight, const float* target,
+                  float* d_log_q);
 
 /// The stack of couplings as arithmetic over blocks of nn::kBlock samples; it holds shapes, no parameters.
 class Flow {
@@ -63,12 +75,12 @@ class Flow {
 
   /// Floats of scratch that train_block needs.
   std::size_t training_scratch_count() const;
-  /// The gradient of sum_i weight[i] * -ln(q(y_i)) over one block; with `uniform` > 0, of the density of the mixture
-  /// (1 - uniform) q + uniform. y: dims x kBlock doubles; weight: kBlock, 0 for samples that only fill the block.
-  /// gradients: parameter_count(), layout as the parameters, gains folded in (see ResidualNet::unfold), padding between
-  /// tensors untouched; it is added to what is there if `accumulate`. Returns the loss.
-  double train_block(const Packed& packed, const double* y, const float* weight, double uniform, float* gradients,
-                     bool accumulate, float* scratch) const;
+  /// The loss over one block, see block_loss, and its gradient. y: dims x kBlock doubles; weight: kBlock, 0 for samples
+  /// that only fill the block; target: kBlock, g of each, may be null with Loss::likelihood. gradients:
+  /// parameter_count(), layout as the parameters, gains folded in (see ResidualNet::unfold), padding between tensors
+  /// untouched; it is added to what is there if `accumulate`.
+  double train_block(const Packed& packed, const double* y, const float* weight, const float* target,
+                     const Objective& objective, float* gradients, bool accumulate, float* scratch) const;
 
   /// What a coupling's networks see: v (dims x kBlock) -> x (inputs x kBlock).
   void encode_kept(const Coupling& coupling, const float* v, float* x) const;

@@ -135,10 +135,15 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
   for (std::size_t s = 0; s < kBlock; ++s)
     weight[s] = s < 50 ? 0.5f + sample_float(9, static_cast<std::uint32_t>(s)) : 0.0f;
   gradients.back() = 5;
-  const double loss =
-      m_flow.train_block(packed, m_y.data(), weight.data(), m_case.uniform, gradients.data(), false, scratch.data());
+  const Objective objective{m_case.uniform > 0 ? RealNvpSettings::Loss::variance : RealNvpSettings::Loss::likelihood,
+                            m_case.uniform, m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
+  Floats target(kBlock);
+  for (std::size_t s = 0; s < kBlock; ++s) target[s] = 3 * sample_float(10, static_cast<std::uint32_t>(s));
+  const double loss = m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(),
+                                         false, scratch.data());
   const Floats once(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(m_parameters.size()));
-  m_flow.train_block(packed, m_y.data(), weight.data(), m_case.uniform, gradients.data(), true, scratch.data());
+  m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(), true,
+                     scratch.data());
   for (std::size_t i = 0; i < once.size(); ++i)
     ASSERT_NEAR(gradients[i], 2 * once[i], 1e-4f * (1 + std::abs(once[i]))) << i;
   EXPECT_EQ(gradients.back(), 5.0f) << "wrote too far";
@@ -153,8 +158,8 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
     double sum = 0;
     for (std::size_t s = 0; s < 50; ++s) {
       const double log_q = reference.log_density(sample(s));
-      sum -= static_cast<double>(weight[s]) *
-             (m_case.uniform > 0 ? std::log((1 - m_case.uniform) * std::exp(log_q) + m_case.uniform) : log_q);
+      const double w = static_cast<double>(weight[s]), mixed = (1 - m_case.uniform) * std::exp(log_q) + m_case.uniform;
+      sum += w * (m_case.uniform > 0 ? static_cast<double>(target[s]) / mixed : -log_q);
     }
     reference.parameters()[i] -= shift;
     return sum;
@@ -174,7 +179,7 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
         continue;
       }
       ++checked;
-      EXPECT_NEAR(static_cast<double>(gradients[at]), wide, 1e-3 * (1 + std::abs(wide)))
+      EXPECT_NEAR(static_cast<double>(gradients[at]) * objective.scale, wide, 1e-3 * (1 + std::abs(wide)))
           << view.name << "(" << r << ", " << c << ")";
     }
   EXPECT_LT(skipped, checked / 4) << "too many kinks for a test";
