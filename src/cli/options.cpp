@@ -94,6 +94,10 @@ void TrainingOptions::add_to(CLI::App& app) {
       ->check(CLI::Range(0, 256));
   add_nvp("--masks", m_masks, "What a coupling moves: alternating dimensions, or binary, halves that change")
       ->check(CLI::IsMember({"alternating", "binary"}));
+  add_nvp("--loss", m_loss, "What training minimises: variance of the estimate, or likelihood, as the paper does")
+      ->check(CLI::IsMember({"variance", "likelihood"}));
+  add_nvp("--networks", m_networks, "shared: s and t from one network; separate, as the paper has them")
+      ->check(CLI::IsMember({"shared", "separate"}));
   add_nvp("--bn", m_bn, "Normalisation: none, actnorm, or batch (as the paper has it)")
       ->check(CLI::IsMember({"none", "actnorm", "batch"}));
   add_nvp("--rate", settings.realnvp.rate, "Step size of Adam")->check(CLI::PositiveNumber);
@@ -130,6 +134,8 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
     result.realnvp.batch = settings.realnvp.batch;
     result.realnvp.max_steps = settings.realnvp.max_steps;
   }
+  if (m_loss == "likelihood") result.realnvp.loss = RealNvpSettings::Loss::likelihood;
+  if (m_networks == "separate") result.realnvp.shared = false;
   if (m_masks == "alternating") result.realnvp.masks = RealNvpSettings::Masks::alternating;
   if (m_bn == "none") result.realnvp.norm = RealNvpSettings::Norm::none;
   if (m_bn == "batch") result.realnvp.norm = RealNvpSettings::Norm::batch;

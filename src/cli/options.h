@@ -42,6 +42,7 @@ struct TrainingOptions {
 
  private:
   std::string m_bn = "actnorm", m_masks = "binary", m_architecture = "default";
+  std::string m_loss = "variance", m_networks = "shared";
   std::string m_kdtree_target = "rms", m_kdtree_split = "best";
 };
 
