@@ -16,7 +16,8 @@ void inspect_warp(const std::filesystem::path& path) {
              warp.layout.name(), warp.scene);
   for (const auto& [name, value] : warp.settings) fmt::print("{:<11} {}\n", name, value);
   fmt::print("tensors\n");
-  for (const auto& [name, tensor] : TensorFile::load(path).entries())
+  const TensorFile tensors = TensorFile::load(path);
+  for (const auto& [name, tensor] : tensors.entries())
     fmt::print("  {:<40} {} {}\n", name, tensor.dtype, fmt::format("[{}]", fmt::join(tensor.shape, ", ")));
 }
 
