@@ -27,7 +27,7 @@ float cylinder_area(const Matrix4& m) {
 bool visible_cone(float distance2, float radius, bool flipped, float& sin2_max, float& cos_max, float& one_minus_cos) {
   const float edge = radius * (flipped ? 1 + kRayEpsilon : 1 - kRayEpsilon);
   if (!(distance2 > edge * edge)) return false;
-  sin2_max = std::fmin(radius * radius / distance2, 1.0f);
+  sin2_max = smaller(radius * radius / distance2, 1.0f);
   cos_max = std::sqrt(1 - sin2_max);
   one_minus_cos = sin2_max / (1 + cos_max);
   return true;
@@ -171,11 +171,10 @@ bool AreaLight::sample_sphere_cone(const Vec3& from, const Vec2& u, float time, 
   Vec3 outwards;
   if (visible_cone(distance2, radius, m_analytic->flip_normals(), sin2_max, cos_max, one_minus_cos)) {
     const float drop = one_minus_cos * u.x;  // 1 - cos theta
-    const float sin2 = std::fmax(0.0f, drop * (2 - drop)), cosine = 1 - drop;
+    const float sin2 = larger(0.0f, drop * (2 - drop)), cosine = 1 - drop;
     const float inverse_sin_max = 1 / std::sqrt(sin2_max);
-    const float cos_alpha =
-        sin2 * inverse_sin_max + cosine * std::sqrt(std::fmax(0.0f, 1 - sin2 * sqr(inverse_sin_max)));
-    const float sin_alpha = std::sqrt(std::fmax(0.0f, 1 - cos_alpha * cos_alpha));
+    const float cos_alpha = sin2 * inverse_sin_max + cosine * std::sqrt(larger(0.0f, 1 - sin2 * sqr(inverse_sin_max)));
+    const float sin_alpha = std::sqrt(larger(0.0f, 1 - cos_alpha * cos_alpha));
     const float phi = 2 * kPi * u.y;
     const Frame frame = frame_of_normal(to_center * (-1 / std::sqrt(distance2)));
     outwards = frame.to_world({std::cos(phi) * sin_alpha, std::sin(phi) * sin_alpha, cos_alpha});
@@ -199,12 +198,20 @@ bool AreaLight::sample(const Vec3& from, const Vec2& u, float time, LightPoint& 
   if (m_mesh) {
     if (!sample_mesh(u, time, p, ng, point, pdf_area)) return false;
   } else if (m_rectangle) {
-    const Matrix4 m = m_moves ? rectangle_matrix(*m_rectangle, time) : m_matrix;
     float density = 1;
     point.uv = m_uniform ? u : m_over_uv.sample(u, density);
-    p = transform_point(m, {2 * point.uv.x - 1, 2 * point.uv.y - 1, 0});
-    ng = point.ns = m_moves ? rectangle_normal(*m_rectangle, time) : m_normal;
-    pdf_area = density * (m_moves ? 1 / (4 * plane_scale(m)) : m_inverse_area);
+    const Vec3 local(2 * point.uv.x - 1, 2 * point.uv.y - 1, 0);
+    if (m_moves) {
+      const Matrix4 m = rectangle_matrix(*m_rectangle, time);
+      p = transform_point(m, local);
+      ng = rectangle_normal(*m_rectangle, time);
+      pdf_area = density / (4 * plane_scale(m));
+    } else {
+      p = transform_point(m_matrix, local);
+      ng = m_normal;
+      pdf_area = density * m_inverse_area;
+    }
+    point.ns = ng;
   } else if (m_analytic->kind() == AnalyticShape::Kind::sphere) {
     if (!sample_sphere_cone(from, u, time, point)) return false;
     if (m_textured) point.uv = m_analytic->at(from + point.wo * point.distance, time).uv;
@@ -230,7 +237,7 @@ bool AreaLight::sample(const Vec3& from, const Vec2& u, float time, LightPoint& 
   const float distance2 = d.dot(d);
   if (!(distance2 > 0)) return false;
   point.distance = std::sqrt(distance2);
-  point.wo = d / point.distance;
+  point.wo = d * (1 / point.distance);
   point.pdf = to_solid_angle(pdf_area, point.wo, point.distance, ng);
   return point.pdf > 0;
 }

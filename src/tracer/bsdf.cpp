@@ -27,9 +27,9 @@ float map_factor(const Scatter& scatter, const ScatterLobe& lobe, const Vec3& wo
     const float cos_outer = wo.dot(outer_n);
     if (!(wo.dot(inner_n) * cos_outer > 0)) return 0;
     if (p.shadowed) {
-      const float cos2_n = std::fmax(sqr(inner_n.dot(outer_n)), 1e-12f), cos2_o = std::fmax(sqr(cos_outer), 1e-12f);
-      const float alpha2 = std::fmin(0.125f * std::fmax(0.0f, 1 - cos2_n) / cos2_n, 1.0f);
-      factor *= 2 / (1 + std::sqrt(1 + alpha2 * std::fmax(0.0f, 1 - cos2_o) / cos2_o));
+      const float cos2_n = larger(sqr(inner_n.dot(outer_n)), 1e-12f), cos2_o = larger(sqr(cos_outer), 1e-12f);
+      const float alpha2 = smaller(0.125f * larger(0.0f, 1 - cos2_n) / cos2_n, 1.0f);
+      factor *= 2 / (1 + std::sqrt(1 + alpha2 * larger(0.0f, 1 - cos2_o) / cos2_o));
     }
     frame = p.outer;
   }
@@ -85,7 +85,7 @@ BsdfSample sample_bsdf(const Scatter& scatter, float u, const Vec2& dir) {
   const ScatterLobe* lobe = scatter.lobes.data();
   if (scatter.lobe_count > 1) {
     while (u >= lobe->weight && lobe + 1 != lobes_end(scatter)) u -= (lobe++)->weight;
-    u = std::fmin(u / lobe->weight, kOneMinusEpsilon);
+    u = smaller(u / lobe->weight, kOneMinusEpsilon);
   }
   const Frame frame = frame_of(scatter, *lobe);
   const LobeSample s =

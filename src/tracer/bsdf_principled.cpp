@@ -22,7 +22,7 @@ float schlick_white(float cos_theta_i, float eta) {
   const bool outside = cos_theta_i >= 0;
   const float eta_it = outside ? eta : 1 / eta;
   if (eta_it > 1) return schlick_weight(std::fabs(cos_theta_i));
-  return schlick_weight(std::sqrt(std::fmax(0.0f, 1 - (1 - sqr(cos_theta_i)) / sqr(eta_it))));
+  return schlick_weight(std::sqrt(larger(0.0f, 1 - (1 - sqr(cos_theta_i)) / sqr(eta_it))));
 }
 
 /// Base colour without its luminance.
@@ -43,13 +43,13 @@ struct ClearCoat {
   Vec3 sample(const Vec2& u) const {
     const float phi = 2 * kPi * u.x;
     const float cos2 = (1 - std::pow(alpha2, 1 - u.y)) / (1 - alpha2);
-    const float sin_theta = std::sqrt(std::fmax(0.0f, 1 - cos2));
-    return {std::cos(phi) * sin_theta, std::sin(phi) * sin_theta, std::sqrt(std::fmax(0.0f, cos2))};
+    const float sin_theta = std::sqrt(larger(0.0f, 1 - cos2));
+    return {std::cos(phi) * sin_theta, std::sin(phi) * sin_theta, std::sqrt(larger(0.0f, cos2))};
   }
   static float smith_g1(const Vec3& v, const Vec3& h) {
     if (!(v.dot(h) * v.z > 0)) return 0;
     const float cos2 = v.z * v.z;
-    const float tan2 = std::fmax(0.0f, 1 - cos2) / cos2;
+    const float tan2 = larger(0.0f, 1 - cos2) / cos2;
     return 2 / (1 + std::sqrt(1 + 0.0625f * tan2));
   }
 };
@@ -86,7 +86,7 @@ struct Setup {
   static Microfacet make_distribution(const LobeModel& m, const PrincipledValues& v) {
     const float alpha = sqr(v.roughness);
     const float aspect = m.has_anisotropic ? std::sqrt(1 - 0.9f * v.anisotropic) : 1;
-    return {MicrofacetType::ggx, std::fmax(0.001f, alpha / aspect), std::fmax(0.001f, alpha * aspect), true};
+    return {MicrofacetType::ggx, larger(0.001f, alpha / aspect), larger(0.001f, alpha * aspect), true};
   }
 };
 
@@ -160,8 +160,8 @@ LobeEval eval_principled(const LobeModel& m, const PrincipledValues& v, const Ve
     } else if (setup.bsdf > 0) {
       const float denominator = sqr(wi_h + eta * wo_h);
       if (denominator > 0) {
-        const Color root(std::sqrt(std::fmax(0.0f, v.base_color.x)), std::sqrt(std::fmax(0.0f, v.base_color.y)),
-                         std::sqrt(std::fmax(0.0f, v.base_color.z)));
+        const Color root(std::sqrt(larger(0.0f, v.base_color.x)), std::sqrt(larger(0.0f, v.base_color.y)),
+                         std::sqrt(larger(0.0f, v.base_color.z)));
         const float jacobian = std::fabs(wo_h * wi_h) / denominator;
         e.value = root * (setup.bsdf * (1 - fresnel) * visible * g1_wo * jacobian);
         e.pdf = setup.specular * refracted * visible * jacobian * eta * eta;

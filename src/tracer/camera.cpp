@@ -42,10 +42,10 @@ Camera::Ray Camera::ray(const Vec2& film, const Vec2& lens, float time) const {
     on_lens = {at.x, at.y, 0};
     d = pinhole * m_focus_distance - on_lens;
   }
-  d.normalize();
+  d = unit(d);
   const Vec3 translation = m_moves ? lerp(m_translation[0], m_translation[1], time) : m_translation[0];
   Ray ray;
-  ray.direction = to_world(d, time).normalized();
+  ray.direction = unit(to_world(d, time));
   ray.origin = translation + to_world(on_lens, time) + ray.direction * (m_near / d.z);
   ray.t_max = (m_far - m_near) / d.z;
   return ray;

@@ -6,12 +6,14 @@
 namespace warpath {
 namespace {
 
+constexpr std::size_t kFew = 24;
+
 // Inverts the distribution function of a density that runs linearly from a to b over [0,1]; `area` in [0, (a + b) / 2].
 float sample_linear(float a, float b, float area) {
   // a t + (b - a) t^2 / 2 = area, in the form of the quadratic formula that does not cancel.
-  const float root = std::sqrt(std::fmax(0.0f, a * a + 2 * (b - a) * area));
+  const float root = std::sqrt(larger(0.0f, a * a + 2 * (b - a) * area));
   const float denominator = a + root;
-  return denominator > 0 ? std::fmin(2 * area / denominator, 1.0f) : 0.0f;
+  return denominator > 0 ? smaller(2 * area / denominator, 1.0f) : 0.0f;
 }
 
 }  // namespace
@@ -31,9 +33,15 @@ DiscreteDistribution::DiscreteDistribution(std::span<const float> weights) {
 }
 
 std::size_t DiscreteDistribution::sample(float u, float& rest) const {
+  if (size() <= kFew) {  // counting beats a search whose every step is a guess for the processor
+    std::size_t i = 0;
+    for (std::size_t k = 1; k < size(); ++k) i += u >= m_cdf[k];
+    rest = smaller(kOneMinusEpsilon, (u - m_cdf[i]) / (m_cdf[i + 1] - m_cdf[i]));
+    return i;
+  }
   const auto above = std::upper_bound(m_cdf.begin() + 1, m_cdf.end() - 1, u);
   const std::size_t i = static_cast<std::size_t>(above - m_cdf.begin()) - 1;
-  rest = std::fmin((u - m_cdf[i]) / (m_cdf[i + 1] - m_cdf[i]), kOneMinusEpsilon);
+  rest = smaller((u - m_cdf[i]) / (m_cdf[i + 1] - m_cdf[i]), kOneMinusEpsilon);
   return i;
 }
 

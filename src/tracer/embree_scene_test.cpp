@@ -84,7 +84,9 @@ TEST(EmbreeScene, StreamsOfAnyLengthAgreeWithEveryShapeTestedAlone) {
       for (const auto& sphere : spheres) sphere.intersect(Vec3(0), w.rays.direction(i), 0, 0, nearest, nearest);
       EXPECT_EQ(w.hits.shape[i] != kNoHit, nearest < 1e9f);
       EXPECT_EQ(w.shadowed[i] != 0, nearest < 1e9f);
-      if (nearest < 1e9f) EXPECT_FLOAT_EQ(w.hits.t[i], nearest);
+      if (nearest < 1e9f) {
+        EXPECT_FLOAT_EQ(w.hits.t[i], nearest);
+      }
     }
   }
 }

@@ -68,7 +68,7 @@ Color Emitters::spot_intensity(const Spot& spot, const Vec3& away) const {
   const Vec3 local = transform_vector(spot.to_local, away).normalized();
   if (!(local.z > spot.cos_cutoff)) return Color(0.0f);
   const float falloff =
-      local.z >= spot.cos_beam ? 1.0f : (spot.cutoff - std::acos(std::fmin(local.z, 1.0f))) * spot.inverse_transition;
+      local.z >= spot.cos_beam ? 1.0f : (spot.cutoff - std::acos(smaller(local.z, 1.0f))) * spot.inverse_transition;
   Color intensity = spot.intensity * falloff;
   if (spot.texture >= 0) {
     const float scale = 0.5f / (local.z * spot.tan_cutoff);
@@ -91,7 +91,7 @@ bool Emitters::sample(const Vec3& from, float choice, const Vec2& uv, float time
       sample.wo = point.wo;
       sample.distance = point.distance;
       sample.pdf = point.pdf * entry.probability;
-      sample.weight = area_radiance(area, point.uv) / sample.pdf;
+      sample.weight = area_radiance(area, point.uv) * (1 / sample.pdf);
       return true;
     }
     case Entry::Kind::environment: {
@@ -100,7 +100,7 @@ bool Emitters::sample(const Vec3& from, float choice, const Vec2& uv, float time
       if (!(pdf > 0)) return false;
       sample.distance = kInfinity;
       sample.pdf = pdf * entry.probability;
-      sample.weight = m_environment->radiance(sample.wo) / sample.pdf;
+      sample.weight = m_environment->radiance(sample.wo) * (1 / sample.pdf);
       return true;
     }
     case Entry::Kind::point:

@@ -34,7 +34,7 @@ Environment::Environment(const EnvmapEmitter& emitter)
   for (int y = 0; y < height; ++y) {
     const float sine = std::sin(kPi * static_cast<float>(y) / static_cast<float>(height - 1));
     for (int x = 0; x <= width; ++x)
-      values.push_back(std::fmax(0.0f, luminance(texel(*m_image, x % width, std::min(y, m_image->height - 1)))) * sine);
+      values.push_back(larger(0.0f, luminance(texel(*m_image, x % width, std::min(y, m_image->height - 1)))) * sine);
   }
   m_distribution = BilinearDistribution(std::move(values), width + 1, height);
 }
@@ -66,7 +66,7 @@ float Environment::pdf(const Vec3& wo) const {
   Vec2 uv = direction_to_uv(local);
   uv.x -= 0.5f / static_cast<float>(m_image->width);
   uv.x -= std::floor(uv.x);
-  const float sine = std::fmax(std::hypot(local.x, local.z), kSmallestSine);
+  const float sine = larger(std::hypot(local.x, local.z), kSmallestSine);
   return m_distribution.pdf(uv) / (2 * kPi * kPi * sine);
 }
 
@@ -79,7 +79,7 @@ Vec3 Environment::sample(const Vec2& u, float& pdf_out) const {
   const Vec2 uv = m_distribution.sample(u, density);
   const float theta = uv.y * kPi, phi = (uv.x + 0.5f / static_cast<float>(m_image->width)) * 2 * kPi;
   const float sine = std::sin(theta);
-  pdf_out = density / (2 * kPi * kPi * std::fmax(sine, kSmallestSine));
+  pdf_out = density / (2 * kPi * kPi * larger(sine, kSmallestSine));
   return transform_vector(m_to_world, {std::sin(phi) * sine, std::cos(theta), -std::cos(phi) * sine}).normalized();
 }
 

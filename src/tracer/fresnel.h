@@ -20,7 +20,7 @@ inline FresnelDielectric fresnel_dielectric(float cos_theta_i, float eta) {
   f.eta_it = outside ? eta : inv_eta;
   f.eta_ti = outside ? inv_eta : eta;
   const float cos_i = std::fabs(cos_theta_i);
-  const float cos_t = std::sqrt(std::fmax(0.0f, 1 - (1 - cos_i * cos_i) * f.eta_ti * f.eta_ti));
+  const float cos_t = std::sqrt(larger(0.0f, 1 - (1 - cos_i * cos_i) * f.eta_ti * f.eta_ti));
   if (eta == 1) {
     f.reflectance = 0;
   } else if (cos_i == 0) {

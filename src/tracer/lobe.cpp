@@ -93,7 +93,7 @@ Color lobe_albedo(const LobeModel& m, const float* values, const Vec3& wi) {
 }
 
 float lobe_roughness(const LobeModel& m, const float* values) {
-  const auto of_alpha = [](float u, float v) { return clamp01(std::sqrt(std::sqrt(std::fmax(0.0f, u * v)))); };
+  const auto of_alpha = [](float u, float v) { return clamp01(std::sqrt(std::sqrt(larger(0.0f, u * v)))); };
   // Plastics: base and surface share the light about evenly in what a path sees of them.
   switch (m.type) {
     case LobeType::diffuse:

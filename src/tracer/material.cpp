@@ -220,6 +220,11 @@ void Materials::at(BsdfId bsdf, const SurfacePoint& point, Scatter& scatter) con
   Resolver(m_impl->compiled, point, scatter).resolve(m_impl->compiled.nodes[bsdf]);
 }
 
+void Materials::prefetch(BsdfId bsdf, const Vec2& uv) const {
+  for (const TextureId image : m_impl->compiled.nodes[bsdf].images)
+    if (image >= 0) m_impl->compiled.textures.prefetch(image, uv);
+}
+
 Color Materials::texture(TextureId id, Vec2 uv) const { return m_impl->compiled.textures.color(id, uv); }
 
 }  // namespace warpath

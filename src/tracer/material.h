@@ -43,6 +43,8 @@ class Materials {
   bool needs_tangents(BsdfId bsdf) const;
   bool needs_uv(BsdfId bsdf) const;  ///< true if any texture below it is not constant
   void at(BsdfId bsdf, const SurfacePoint& point, Scatter& scatter) const;
+  /// Starts loading the texels that at() will read; to be called a while before it.
+  void prefetch(BsdfId bsdf, const Vec2& uv) const;
   Color texture(TextureId id, Vec2 uv) const;
 
  private:

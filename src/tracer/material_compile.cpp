@@ -74,7 +74,16 @@ class Compiler {
 
   void uses(MaterialNode& n, TextureId t) const {
     WARPATH_CHECK(t >= 0 && static_cast<std::size_t>(t) < m_result.textures.size());
-    n.needs_uv |= !m_result.textures.is_constant(t);
+    if (m_result.textures.is_constant(t)) return;
+    n.needs_uv = true;
+    add_image(n, t);
+  }
+
+  static void add_image(MaterialNode& n, TextureId t) {
+    for (TextureId& image : n.images) {
+      if (image < 0) image = t;
+      if (image == t) return;
+    }
   }
 
   void set(MaterialNode& n, const Diffuse& d) { lobe(n, LobeType::diffuse, {d.reflectance}, 1); }
@@ -180,6 +189,9 @@ class Compiler {
     n.children[1] = second;
     n.needs_tangents = a.needs_tangents || b.needs_tangents;
     n.needs_uv = a.needs_uv || b.needs_uv;
+    for (const MaterialNode* child : {&a, &b})
+      for (const TextureId t : child->images)
+        if (t >= 0) add_image(n, t);
     n.anisotropic = a.anisotropic || b.anisotropic;
     n.tangent_frame = a.tangent_frame || b.tangent_frame;
     n.turns_to_wi = a.turns_to_wi && b.turns_to_wi;

@@ -20,9 +20,10 @@ struct MaterialNode {
   bool turns_to_wi = false;                           ///< every lobe below, not under a map, is twosided or null
   std::uint16_t model = 0;                            ///< lobe: index into CompiledMaterials::models
   std::int32_t children[2]{-1, -1};
-  TextureId texture = -1;              ///< opacity, weight, displacement or normalmap
-  float scale = 1;                     ///< bump_map
-  std::array<TextureId, 11> values{};  ///< lobe: textures in the order of its values
+  TextureId texture = -1;                   ///< opacity, weight, displacement or normalmap
+  float scale = 1;                          ///< bump_map
+  std::array<TextureId, 11> values{};       ///< lobe: textures in the order of its values
+  std::array<TextureId, 2> images{-1, -1};  ///< bitmaps below, the first that at() looks up; worth prefetching
   // What the worst path through it needs of a Scatter.
   int lobes = 1, value_count = 0, perturbed = 0;
 };

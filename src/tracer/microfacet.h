@@ -31,7 +31,7 @@ inline float erf_inverse(float x) {
 /// published inversion. The slope across is erf_inverse(2 u' - 1), whatever theta.
 inline float visible_slope_beckmann(float sin_theta, float cos_theta, float u) {
   const float inv_sqrt_pi = 0.5641895835f, limit = 1 - 1e-6f;
-  const float tan_theta = sin_theta / std::fmax(cos_theta, 1e-6f);
+  const float tan_theta = sin_theta / larger(cos_theta, 1e-6f);
   const float cot_theta = tan_theta > 0 ? 1 / tan_theta : 1e10f;
   const float max = std::erf(cot_theta);
   float x = max - (max + 1) * std::erf(std::sqrt(-std::log(u)));  // the solution at grazing incidence
@@ -69,8 +69,8 @@ class Microfacet {
   Microfacet(MicrofacetType type, float alpha_u, float alpha_v, bool sample_visible)
       : m_type(type),
         m_sample_visible(sample_visible),
-        m_alpha_u(std::fmax(alpha_u, 1e-4f)),
-        m_alpha_v(std::fmax(alpha_v, 1e-4f)) {}
+        m_alpha_u(larger(alpha_u, 1e-4f)),
+        m_alpha_v(larger(alpha_v, 1e-4f)) {}
 
   bool sample_visible() const { return m_sample_visible; }
   void scale_alpha(float factor) {
@@ -137,7 +137,7 @@ class Microfacet {
     // Stretched so that the roughness is 1, sampled there as if wi had no azimuth, turned and squeezed back.
     const float x = m_alpha_u * wi.x, y = m_alpha_v * wi.y;
     const float xy2 = x * x + y * y;
-    const float inv_xy = 1 / std::sqrt(std::fmax(xy2, 1e-38f)), inv_all = 1 / std::sqrt(xy2 + wi.z * wi.z);
+    const float inv_xy = 1 / std::sqrt(larger(xy2, 1e-38f)), inv_all = 1 / std::sqrt(xy2 + wi.z * wi.z);
     const float cos_phi = xy2 > 1e-38f ? x * inv_xy : 1, sin_phi = xy2 > 1e-38f ? y * inv_xy : 0;
     const float sin_theta = xy2 * inv_xy * inv_all, cos_theta = wi.z * inv_all;
     Vec2 slope;

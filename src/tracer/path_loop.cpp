@@ -1,6 +1,7 @@
 #include "tracer/path_loop.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 
@@ -21,7 +22,14 @@ constexpr float kMaxSurvival = 0.95f;
 constexpr std::uint32_t kLastBounce = 0xffff;  // what a Group can name
 
 // How many hits before its turn the data of a hit is asked for.
-constexpr std::size_t kTriangleAhead = 24, kVerticesAhead = 12;
+constexpr std::size_t kTriangleAhead = 24, kVerticesAhead = 12, kTexturesAhead = 8;
+// The same for vertices whose Scatter is used again.
+constexpr std::size_t kScatterAhead = 4;
+
+void prefetch(const Scatter& scatter) {
+  const char* line = reinterpret_cast<const char*>(&scatter);
+  for (std::size_t i = 0; i < sizeof(Scatter); i += 64) __builtin_prefetch(line + i);
+}
 
 // Places of a bounce's numbers in VertexRecords::numbers.
 constexpr int kLight = 0, kLightUv = 1, kLobe = 3, kDir = 4, kRoulette = 6;
@@ -137,7 +145,14 @@ void PathLoop::resolve_hits(std::uint32_t bounce, Color* radiance, PathRecorder*
   const bool scatters = may_continue(bounce);
   const bool emits = bounce > 1;
   m_vertices = 0;
-  SurfacePoint point;
+  // Vertices whose textures have been asked for, and wait for them a while.
+  std::array<SurfacePoint, kTexturesAhead> waiting;
+  std::size_t resolved = 0;
+  const auto resolve_next = [&] {
+    const SurfacePoint& point = waiting[resolved % kTexturesAhead];
+    m_scene.materials.at(static_cast<BsdfId>(w.context.material[resolved]), point, w.scatter[resolved]);
+    ++resolved;
+  };
   const auto add = [&](std::uint32_t lane, const Color& emitted, float pdf) {
     if (m_hide_emitters && w.straight[lane]) return;
     const float previous_pdf = w.previous_pdf[lane];
@@ -160,6 +175,8 @@ void PathLoop::resolve_hits(std::uint32_t bounce, Color* radiance, PathRecorder*
     }
     const std::int32_t emitter = m_scene.surfaces.emitter(shape);
     if (!scatters && emitter < 0) continue;
+    if (m_vertices - resolved == kTexturesAhead) resolve_next();
+    SurfacePoint& point = waiting[m_vertices % kTexturesAhead];
     const Vec3 position = m_scene.surfaces.at(w.hits, i, w.rays, point);
     if (emits && emitter >= 0) {
       const Color emitted = m_scene.emitters.radiance(emitter, point);
@@ -177,9 +194,10 @@ void PathLoop::resolve_hits(std::uint32_t bounce, Color* radiance, PathRecorder*
     w.time[j] = w.rays.time[i];
     const BsdfId bsdf = m_scene.surfaces.bsdf(shape);
     w.context.material[j] = static_cast<std::uint32_t>(bsdf);
-    m_scene.materials.at(bsdf, point, w.scatter[j]);
+    m_scene.materials.prefetch(bsdf, point.uv);
     if (m_needs_context) w.context.wi.set(j, point.wi);
   }
+  while (resolved < m_vertices) resolve_next();
 }
 
 void PathLoop::fill_context() {
@@ -217,6 +235,7 @@ void PathLoop::sample_emitters(std::uint16_t bounce, Color* radiance, PathRecord
   std::size_t shadows = 0;
   EmitterSample sample;
   for (std::size_t k = 0; k < n; ++k) {
+    if (k + kScatterAhead < n) prefetch(w.scatter[w.subset[k + kScatterAhead]]);
     const std::uint32_t j = w.subset[k];
     const float choice = choose ? w.light.u0[k] : 0.0f;
     const float inv_q = (weigh_choice ? w.light.inv_q[k] : 1.0f) * (weigh_uv ? w.light_uv.inv_q[k] : 1.0f);
@@ -243,8 +262,8 @@ void PathLoop::sample_emitters(std::uint16_t bounce, Color* radiance, PathRecord
       const Vec3 target = position + d * sample.distance;
       origin = offset_point(position, ng, d);
       d = target - origin;
-      const float length = d.length();
-      d /= length;
+      const float length = std::sqrt(d.dot(d));
+      d *= 1 / length;
       end = length * (1 - kShadowEpsilon);
     }
     w.shadow_rays.set(shadows, origin, d, end, time);
@@ -275,6 +294,7 @@ void PathLoop::sample_bsdfs(std::uint16_t bounce, PathRecorder* recorder) {
   const bool weigh_dir = draw({GroupKind::dir, bounce}, lanes, shown, w.dir);
   std::size_t kept = 0;
   for (std::size_t j = 0; j < m_vertices; ++j) {
+    if (j + kScatterAhead < m_vertices) prefetch(w.scatter[j + kScatterAhead]);
     const std::uint32_t lane = w.vertex_lanes[j];
     const float inv_q = (weigh_lobe ? w.lobe.inv_q[j] : 1.0f) * (weigh_dir ? w.dir.inv_q[j] : 1.0f);
     const BsdfSample s = sample_bsdf(w.scatter[j], w.lobe.u0[j], {w.dir.u0[j], w.dir.u1[j]});
@@ -313,7 +333,7 @@ void PathLoop::play_roulette(std::uint16_t bounce, PathRecorder* recorder) {
   for (std::size_t k = 0; k < m_rays; ++k) {
     const std::uint32_t lane = w.lanes[k];
     const Color beta = w.beta.color(lane);
-    const float survival = std::fmin(max_component(beta) * sqr(w.eta[lane]), kMaxSurvival);
+    const float survival = smaller(max_component(beta) * sqr(w.eta[lane]), kMaxSurvival);
     const bool survives = w.roulette.u0[k] < survival;
     const float inv_q = weigh ? w.roulette.inv_q[k] : 1.0f;
     if (recorder) {

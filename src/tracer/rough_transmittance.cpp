@@ -149,7 +149,7 @@ RoughInterface make_rough_interface(MicrofacetType distribution, float alpha, fl
   auto table = std::make_shared<RoughTransmittance::Table>();
   double internal = 0;
   for (int i = 0; i < kNodes; ++i) {
-    const float mu = std::fmax(1e-6f, static_cast<float>(i) / (kNodes - 1));
+    const float mu = larger(1e-6f, static_cast<float>(i) / (kNodes - 1));
     (*table)[i] = static_cast<float>(outside.scattered(mu, eta, true));
     internal += inside.scattered(mu, 1 / eta, false) * mu;
   }

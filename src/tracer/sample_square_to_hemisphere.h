@@ -27,7 +27,7 @@ inline Vec2 square_to_disk(const Vec2& u) {
 /// Directions with density cos(theta) / pi around +z.
 inline Vec3 square_to_cosine_hemisphere(const Vec2& u) {
   const Vec2 p = square_to_disk(u);
-  return {p.x, p.y, std::sqrt(std::fmax(0.0f, 1 - p.x * p.x - p.y * p.y))};
+  return {p.x, p.y, std::sqrt(larger(0.0f, 1 - p.x * p.x - p.y * p.y))};
 }
 inline float cosine_hemisphere_pdf(float cos_theta) { return cos_theta * (1 / kPi); }
 

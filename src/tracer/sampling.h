@@ -10,16 +10,19 @@ namespace warpath {
 /// The whole sphere; u.x is the azimuth, u.y runs from +z to -z; density 1 / (4 pi).
 inline Vec3 sample_sphere(const Vec2& u) {
   const float z = 1 - 2 * u.y;
-  const float r = std::sqrt(std::fmax(0.0f, 1 - z * z));
+  const float r = std::sqrt(larger(0.0f, 1 - z * z));
   const float phi = 2 * kPi * u.x;
   return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
 /// Barycentric coordinates (b1, b2) of a triangle; density 1 / area.
 inline Vec2 sample_triangle(const Vec2& u) {
-  const float t = std::sqrt(std::fmax(0.0f, 1 - u.x));
+  const float t = std::sqrt(larger(0.0f, 1 - u.x));
   return {1 - t, t * u.y};
 }
+
+/// v over its length, by one division. Not for vectors so short that their square underflows.
+inline Vec3 unit(const Vec3& v) { return v * (1 / std::sqrt(v.dot(v))); }
 
 /// Affine maps in Imath's row-vector convention.
 inline Vec3 transform_point(const Matrix4& m, const Vec3& p) {

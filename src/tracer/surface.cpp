@@ -57,7 +57,7 @@ Vec3 Surfaces::at(const HitStream& hits, std::size_t i, const RayStream& rays, S
   const Vec3 position = rays.origin(i) + rays.direction(i) * hits.t[i];
   point.wi = -rays.direction(i);
   if (shape.mesh) {
-    point.ng = Vec3(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
+    point.ng = unit({hits.nx[i], hits.ny[i], hits.nz[i]});
     mesh_at(shape, hits.primitive[i], hits.u[i], hits.v[i], rays.time[i], point);
     return position;
   }

@@ -61,7 +61,7 @@ inline constexpr float kShadowEpsilon = 10 * kRayEpsilon;
 
 /// Where a ray along `direction` starts that leaves the surface at p: pushed off along the geometric normal.
 inline Vec3 offset_point(const Vec3& p, const Vec3& ng, const Vec3& direction) {
-  const float largest = std::fmax(std::fabs(p.x), std::fmax(std::fabs(p.y), std::fabs(p.z)));
+  const float largest = larger(std::fabs(p.x), larger(std::fabs(p.y), std::fabs(p.z)));
   return p + ng * std::copysign((1 + largest) * kRayEpsilon, ng.dot(direction));
 }
 

@@ -28,7 +28,7 @@ float mean_channel(const Color& c) { return (c.x + c.y + c.z) * (1 / 3.0f); }
 
 int floor_to_int(float x) {
   // Clamped first: what is outside of int has no texel of its own, and NaN becomes the lower end.
-  return static_cast<int>(std::floor(std::fmin(std::fmax(x, -1e9f), 1e9f)));
+  return static_cast<int>(std::floor(smaller(1e9f, larger(-1e9f, x))));
 }
 
 }  // namespace
@@ -137,6 +137,18 @@ float TextureLookup::varying_scalar(const Compiled& t, const Vec2& uv) {
     return right == lower ? t.scalar1 : t.scalar0;
   }
   return luminance(varying_color(t, uv));
+}
+
+void TextureLookup::prefetch(TextureId id, const Vec2& uv) const {
+  const Compiled& t = at(id);
+  if (t.type != Type::bitmap) return;
+  const Vec2 p = t.transform(uv);
+  const int x = t.wrap_to(floor_to_int(p.x * static_cast<float>(t.width) - 0.5f), t.width);
+  const int y = floor_to_int(p.y * static_cast<float>(t.height) - 0.5f);
+  for (const int row : {t.wrap_to(y, t.height), t.wrap_to(y + 1, t.height)}) {
+    const std::size_t first = (static_cast<std::size_t>(row) * t.width + x) * t.channels;
+    __builtin_prefetch(t.bytes ? static_cast<const void*>(t.bytes + first) : t.floats + first);
+  }
 }
 
 Vec2 TextureLookup::gradient(TextureId id, const Vec2& uv) const {

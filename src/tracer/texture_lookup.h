@@ -28,6 +28,8 @@ class TextureLookup {
     const Compiled& t = at(id);
     return t.type == Type::constant ? t.scalar0 : varying_scalar(t, uv);
   }
+  /// Starts loading the texels that a look-up at uv will read.
+  void prefetch(TextureId id, const Vec2& uv) const;
   /// Change of scalar() with u and v; 0 unless interpolated.
   Vec2 gradient(TextureId id, const Vec2& uv) const;
   /// Average over the image or pattern.

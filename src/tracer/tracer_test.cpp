@@ -455,7 +455,9 @@ TEST(FirstHits, AlbedoNormalAndDistance) {
     EXPECT_EQ(hits.distance[i] > 0, inside);
     EXPECT_NEAR(hits.normal[i].z, inside ? 1 : 0, 1e-6f);
     EXPECT_NEAR(hits.albedo[i].z, inside ? 0.8f : 0, 1e-6f);
-    if (inside) EXPECT_NEAR(hits.distance[i], (2 - 1e-3f) * std::sqrt(1 + x * x + y * y), 1e-4f);
+    if (inside) {
+      EXPECT_NEAR(hits.distance[i], (2 - 1e-3f) * std::sqrt(1 + x * x + y * y), 1e-4f);
+    }
   }
 }
 
