@@ -10,7 +10,7 @@ namespace warpath {
 
 /// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
 struct RealNvpSettings {
-  int couplings = 16;
+  int couplings = 24;
   int width = 32;
   int blocks = 1;      ///< residual blocks of two dense layers in each of s and t
   int bins = 15;       ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
@@ -27,7 +27,7 @@ struct RealNvpSettings {
   int max_steps = 3000;      ///< training ends sooner, when the held-out loss no longer falls
   double held_out = 0.05;    ///< share of the examples that is never trained on
   double uniform = 0.1;      ///< share of uniform samples that Loss::variance counts on
-  double average = 0.99;     ///< decay per step of the moving average of the weights that is handed out; 0 for none
+  double average = 0.998;    ///< decay per step of the moving average of the weights that is handed out; 0 for none
   int evaluate_every = 100;  ///< steps between evaluations of the held-out loss
   int patience = 3;    ///< evaluations without gain, after which the rate falls to a third, and at last training ends
   int rate_drops = 2;  ///< how often the rate falls
