@@ -51,7 +51,9 @@ TEST(Resample, CopiesAreWithinTwoOfTheirExpectation) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const double expected = 50'000 * candidates.target[i] / total;
     EXPECT_LE(std::fabs(count[i] - expected), 2.0) << i;
-    if (candidates.target[i] == 0) EXPECT_EQ(count[i], 0) << i;
+    if (candidates.target[i] == 0) {
+      EXPECT_EQ(count[i], 0) << i;
+    }
   }
 }
 
