@@ -128,7 +128,7 @@ EmbreeScene::EmbreeScene(std::span<const Shape> shapes, std::span<const Analytic
   if (!impl.device) on_error(nullptr, rtcGetDeviceError(nullptr), "no device");
   rtcSetDeviceErrorFunction(impl.device, on_error, nullptr);
   impl.scene = rtcNewScene(impl.device);
-  rtcSetSceneBuildQuality(impl.scene, RTC_BUILD_QUALITY_HIGH);
+  rtcSetSceneBuildQuality(impl.scene, RTC_BUILD_QUALITY_MEDIUM);
   rtcSetSceneFlags(impl.scene, RTC_SCENE_FLAG_NONE);
   impl.rectangles.reserve(2 * shapes.size());
 
