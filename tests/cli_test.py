@@ -66,7 +66,8 @@ class CommandLine(unittest.TestCase):
         with tempfile.TemporaryDirectory() as elsewhere:
             scene = os.path.join(elsewhere, "scene.xml")
             with open(scene, "w") as file:
-                file.write('<scene version="3.0.0">\n  <bsdf type="rougplastic" id="a"/>\n</scene>\n')
+                file.write('<scene version="3.0.0">\n  <bsdf type="rougplastic" id="a"/>\n  <sensor type="perspective"/>\n'
+                           '  <integrator type="path"/>\n  <shape type="sphere"><ref id="a"/></shape>\n</scene>\n')
             self.fails(3, "render", scene, "-o", self.path("a.exr"), says=["scene.xml:2:", 'did you mean "roughplastic"?'])
             warp = os.path.join(elsewhere, "broken.warp")
             with open(warp, "wb") as file:
