@@ -73,6 +73,13 @@ void load_packet(const RayStream& rays, std::size_t first, unsigned n, int* vali
     packet.flags[i] = 0;
     packet.id[i] = i;
   }
+  // Without AVX-512 Embree takes packets of 16 apart and does not look at `valid` then, but at whether a ray is empty.
+  for (unsigned i = n; i < kWidth; ++i) {
+    packet.org_x[i] = packet.org_y[i] = packet.org_z[i] = 0;
+    packet.dir_x[i] = packet.dir_y[i] = packet.dir_z[i] = 1;
+    packet.tfar[i] = -1;
+    packet.time[i] = 0;
+  }
 }
 
 }  // namespace
