@@ -59,22 +59,23 @@ Reference as_reference(const ImageEstimate& estimate) {
 
 }  // namespace
 
-ComparisonRunner::ComparisonRunner(std::shared_ptr<const Tracer> tracer, Settings settings)
-    : m_tracer(std::move(tracer)), m_settings(std::move(settings)) {}
+ComparisonRunner::ComparisonRunner(std::shared_ptr<const Tracer> tracer, CompareCommand command,
+                                   std::vector<Method> methods)
+    : m_tracer(std::move(tracer)), m_command(std::move(command)), m_methods(std::move(methods)) {}
 
 void ComparisonRunner::run(int threads) {
   const Scene& scene = m_tracer->scene();
   Comparison& c = m_data.comparison;
-  c.scene = m_settings.scene_name;
+  c.scene = m_command.common.scene.string();
   c.version = WARPATH_VERSION;
   c.commit = WARPATH_COMMIT;
   c.cpu = cpu_name();
   c.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-  c.command = m_settings.command;
+  c.command = m_command.typed;
   c.width = scene.film.crop_width;
   c.height = scene.film.crop_height;
   c.threads = threads;
-  c.seed = m_settings.common.seed;
+  c.seed = m_command.common.seed;
   c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
 
   prepare_reference();
@@ -82,8 +83,8 @@ void ComparisonRunner::run(int threads) {
   c.reference = m_reference.path.string();
   c.reference_has_variance = m_reference.variance.has_value();
 
-  for (int run = 0; run < m_settings.runs && !g_interrupted; ++run)
-    for (const Method& method : m_settings.methods) {
+  for (int run = 0; run < m_command.runs && !g_interrupted; ++run)
+    for (const Method& method : m_methods) {
       if (g_interrupted) break;
       try {
         c.results.push_back(run_method(method, run));
@@ -92,35 +93,34 @@ void ComparisonRunner::run(int threads) {
       }
       // In the order of the methods, all runs of one together.
       const auto place = [&](const MethodRun& r) {
-        return std::find_if(m_settings.methods.begin(), m_settings.methods.end(),
-                            [&](const Method& m) { return m.name == r.method; });
+        return std::find_if(m_methods.begin(), m_methods.end(), [&](const Method& m) { return m.name == r.method; });
       };
       std::stable_sort(c.results.begin(), c.results.end(),
                        [&](const MethodRun& a, const MethodRun& b) { return place(a) < place(b); });
-      write_results(m_settings.directory / "results.json", c);
+      write_results(m_command.directory / "results.json", c);
     }
   if (c.results.empty()) throw Interrupted{};
 }
 
 void ComparisonRunner::prepare_reference() {
   const FilmSettings& film = m_tracer->scene().film;
-  const std::uint64_t seed = mix64(m_settings.common.seed ^ kReferenceStream);
+  const std::uint64_t seed = mix64(m_command.common.seed ^ kReferenceStream);
   ImageEstimator estimator(*m_tracer, {}, nullptr, seed);
-  if (m_settings.reference.empty()) {
-    const int spp = m_settings.reference_spp > 0
-                        ? m_settings.reference_spp
-                        : kReferenceFactor * m_settings.render.spp.value_or(m_tracer->scene().sample_count);
-    StageProgress progress(fmt::format("reference, {} spp", spp), m_settings.common.quiet);
+  if (m_command.reference.empty()) {
+    const int spp = m_command.reference_spp > 0
+                        ? m_command.reference_spp
+                        : kReferenceFactor * m_command.render.spp.value_or(m_tracer->scene().sample_count);
+    StageProgress progress(fmt::format("reference, {} spp", spp), m_command.common.quiet);
     estimator.add_pass(spp, progress.callback());
     if (g_interrupted) throw Interrupted{};
     const ImageEstimate image = estimator.develop();
     m_reference = as_reference(image);
-    m_reference.path = m_settings.directory / "reference.exr";
+    m_reference.path = m_command.directory / "reference.exr";
     m_reference_rest = as_reference(estimator.develop_rest());
     write_image(m_reference.path, image_file(image));
     return;
   }
-  m_reference = read_reference(m_settings.reference, film.crop_width, film.crop_height);
+  m_reference = read_reference(m_command.reference, film.crop_width, film.crop_height);
   // What is left of the given reference without what the camera sees emitted directly.
   constexpr int kEmissionSpp = 256;
   estimator.add_emission_pass(kEmissionSpp);
@@ -133,15 +133,15 @@ void ComparisonRunner::prepare_reference() {
 }
 
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
-  const std::uint64_t seed = m_settings.common.seed + static_cast<std::uint64_t>(run);
+  const std::uint64_t seed = m_command.common.seed + static_cast<std::uint64_t>(run);
   const auto clock = start_clock();
-  const Budget budget = make_budget(m_settings.render, m_tracer->scene().sample_count);
+  const Budget budget = make_budget(m_command.render, m_tracer->scene().sample_count);
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)
     trainer =
-        std::make_unique<MethodTrainer>(m_tracer, m_settings.training.train_settings(seed), m_settings.training.init,
-                                        m_settings.training.use_samples(), m_settings.common.quiet);
+        std::make_unique<MethodTrainer>(m_tracer, m_command.training.train_settings(seed), m_command.training.init,
+                                        m_command.training.use_samples(), m_command.common.quiet);
   const PreparedMethod prepared = trainer->prepare(method);
   const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
 
@@ -166,8 +166,8 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed);
   {
     prepared.add_candidates(estimator);
-    StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_settings.runs),
-                           m_settings.common.quiet);
+    StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
+                           m_command.common.quiet);
     render_passes(estimator, budget, progress.callback(), [&] {
       const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
       result.error_curve.push_back(
@@ -196,8 +196,8 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   if (run == 0) {
     m_data.images.push_back({method.name, image_rgb(image)});
     ImageFile file = image_file(image);
-    describe(file, *m_tracer, method, m_settings.common, estimator, result.total_seconds);
-    write_image(m_settings.directory / (file_name(method.name) + ".exr"), file);
+    describe(file, *m_tracer, method, m_command.common, estimator, result.total_seconds);
+    write_image(m_command.directory / (file_name(method.name) + ".exr"), file);
     keep_densities(method, prepared);
   }
   return result;

@@ -1,9 +1,8 @@
-#include <CLI/CLI.hpp>
-#include <memory>
+#include <array>
 
 #include "cli/commands.h"
-#include "cli/options.h"
 #include "core/tensor_file.h"
+#include "scene/scene.h"
 #include "warpath/error.h"
 #include "warpath/warp_file.h"
 
@@ -48,17 +47,11 @@ void inspect_scene(const CommonOptions& common) {
 
 }  // namespace
 
-void add_inspect_command(CLI::App& app) {
-  auto common = std::make_shared<CommonOptions>();
-  CLI::App* sub = app.add_subcommand("inspect", "Tell what is in a scene or a trained warp");
-  sub->add_option("file", common->scene, "Scene file (.xml) or warp")->required()->check(CLI::ExistingFile);
-  common->add_to(*sub);
-  sub->callback([common] {
-    if (common->scene.extension() == ".xml")
-      inspect_scene(*common);
-    else
-      inspect_warp(common->scene);
-  });
+void run(const InspectCommand& command) {
+  if (command.common.scene.extension() == ".xml")
+    inspect_scene(command.common);
+  else
+    inspect_warp(command.common.scene);
 }
 
 }  // namespace warpath

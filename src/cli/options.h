@@ -5,14 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "scene/scene.h"
 #include "warpath/train.h"
 
-namespace CLI {
-class App;
-}
-
 namespace warpath {
+
+struct Scene;
+struct SceneOptions;
 
 /// Options that all commands share.
 struct CommonOptions {
@@ -24,7 +22,6 @@ struct CommonOptions {
   int threads = 0;  ///< 0: all
   bool verbose = false, quiet = false;
 
-  void add_to(CLI::App& app);
   SceneOptions scene_options() const;  ///< throws ConfigError on a malformed --size or -D
 };
 
@@ -35,15 +32,13 @@ struct TrainingOptions {
   std::filesystem::path init;
   std::string training_samples = "discard";  ///< or use: candidates count in the image
   TrainSettings settings;
+  // Choices by name, as they are typed; train_settings puts them into the settings.
+  std::string bn = "actnorm", masks = "binary", architecture = "default";
+  std::string loss = "variance", networks = "shared";
+  std::string kdtree_target = "rms", kdtree_split = "best";
 
-  void add_to(CLI::App& app);
   TrainSettings train_settings(std::uint64_t seed) const;
   bool use_samples() const { return training_samples == "use"; }
-
- private:
-  std::string m_bn = "actnorm", m_masks = "binary", m_architecture = "default";
-  std::string m_loss = "variance", m_networks = "shared";
-  std::string m_kdtree_target = "rms", m_kdtree_split = "best";
 };
 
 /// Options of commands that render.
@@ -52,8 +47,6 @@ struct RenderOptions {
   std::optional<double> time;
   std::string crop;  ///< X,Y,W,H
   std::string aov;   ///< albedo,normal,depth
-
-  void add_to(CLI::App& app);
 };
 
 /// Loads the scene as the options ask for it; crop is applied to its film.
