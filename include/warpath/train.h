@@ -10,7 +10,7 @@ namespace warpath {
 
 /// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
 struct RealNvpSettings {
-  int couplings = 24;
+  int couplings = 16;
   int width = 32;
   int blocks = 1;      ///< residual blocks of two dense layers in each of s and t
   int bins = 15;       ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
