@@ -93,6 +93,12 @@ void add_options(CLI::App& app, RenderOptions& options) {
   app.add_option("--time", options.time, "Seconds for everything after loading, training included")
       ->check(CLI::PositiveNumber)
       ->excludes(by_samples);
+  app.add_option(
+         "--objective", options.objective_name,
+         "The error that samples are placed to lessen where the film is stratified: mse, relmse, or even for as "
+         "many in every pixel; `none` has them even")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"mse", "relmse", "even"}));
   app.add_option("--crop", options.crop, "Part of the film to render")->type_name("X,Y,W,H");
 }
 
@@ -102,7 +108,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
   sub->add_option("-o,--output", command.output, "Image to write: .exr (with variance), .png, .jpg")
       ->capture_default_str();
   sub->add_option("--warp", command.warp,
-                  "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp")
+                  "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, field")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");

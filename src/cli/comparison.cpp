@@ -139,10 +139,10 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)
-    trainer =
-        std::make_unique<MethodTrainer>(m_tracer, m_command.training.train_settings(seed), m_command.training.init,
-                                        m_command.training.use_samples(), m_command.common.quiet);
-  const PreparedMethod prepared = trainer->prepare(method);
+    trainer = std::make_unique<MethodTrainer>(m_tracer, m_command.training.train_settings(seed),
+                                              m_command.training.init, m_command.training.use_samples(),
+                                              m_command.render.objective(), m_command.common.quiet);
+  PreparedMethod prepared = trainer->prepare(method);
   const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
 
   MethodRun result;
@@ -168,10 +168,11 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
     prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
                            m_command.common.quiet);
-    render_passes(estimator, budget, progress.callback(), [&] {
+    render_passes(estimator, budget, prepared.guide, progress.callback(), [&] {
       const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
-      result.error_curve.push_back(
-          {estimator.spp(), prepare_seconds + estimator.cost().total(), errors.mse, errors.relmse});
+      result.error_curve.push_back({estimator.spp(),
+                                    prepare_seconds + prepared.guide.fit_seconds + estimator.cost().total(), errors.mse,
+                                    errors.relmse});
     });
   }
   if (estimator.cost().samples == 0) throw Interrupted{};
@@ -181,7 +182,9 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   result.samples = cost.samples;
   result.warp_seconds = cost.warp_seconds;
   result.trace_seconds = cost.trace_seconds + cost.emission_seconds;
-  result.total_seconds = prepare_seconds + cost.total();
+  result.train_seconds += prepared.guide.fit_seconds;
+  result.train_samples += prepared.guide.taught;
+  result.total_seconds = prepare_seconds + prepared.guide.fit_seconds + cost.total();
   result.non_finite = estimator.non_finite();
   const ImageEstimate image = estimator.develop();
   const ImageRgb rest = image_rgb(estimator.develop_rest());

@@ -13,7 +13,7 @@
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 5> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp"};
+constexpr std::array<std::string_view, 6> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp", "field"};
 constexpr std::string_view kDefaultDimensions = "film+bounce1";
 
 /// Candidates are drawn from other numbers than the image, whatever its seed.
@@ -40,6 +40,12 @@ Method parse_method(const std::string& text) {
     if (colon != std::string::npos)
       throw ConfigError(fmt::format("\"{}\": `none` has no dimensions; uniform:{} draws those at random", text,
                                     text.substr(colon + 1)));
+    return method;
+  }
+  if (method.family == "field") {
+    if (colon != std::string::npos)
+      throw ConfigError(
+          fmt::format("\"{}\": a field warps the numbers of every vertex; it has no dimensions to choose", text));
     return method;
   }
   method.layout =
@@ -73,6 +79,11 @@ void PreparedMethod::add_candidates(ImageEstimator& estimator) const {
 PreparedMethod MethodTrainer::prepare(const Method& method) {
   PreparedMethod prepared;
   if (method.family == "none") return prepared;
+  if (!method.layout.contains({GroupKind::film})) prepared.guide.objective = m_objective;
+  if (method.family == "field") {
+    prepared.guide.trainer = std::make_unique<FieldTrainer>(FieldSettings{}, m_tracer->emitters());
+    return prepared;
+  }
   if (!method.file.empty()) {
     prepared.proposal = load_warp(method.file).proposal;
     return prepared;

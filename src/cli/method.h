@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "cli/render_loop.h"
 #include "estimate/image_estimator.h"
 #include "tracer/tracer.h"
 #include "train/training_data.h"
@@ -16,7 +17,7 @@ namespace warpath {
 struct Method {
   std::string name;            ///< as typed
   std::string family;          ///< `none`, `uniform`, `grid`, ...
-  Layout layout;               ///< empty for `none`
+  Layout layout;               ///< empty for `none`, and for `field`, which warps the numbers of every vertex
   std::filesystem::path file;  ///< of a trained warp; empty if it is trained now
 };
 /// Throws ConfigError that lists the families, or FileError if a warp file cannot be read.
@@ -28,6 +29,7 @@ struct PreparedMethod {
   TrainLog log;
   std::shared_ptr<const Candidates> candidates;  ///< null if it was not trained now
   double candidate_seconds = 0;
+  Guide guide;  ///< for the passes of the render
 
   /// Adds the candidates to an image that is to have them (--training-samples use).
   void add_candidates(ImageEstimator& estimator) const;
@@ -37,12 +39,14 @@ struct PreparedMethod {
 /// ones.
 class MethodTrainer {
  public:
+  /// objective: where the samples of methods with a stratified film go, all but those of `none`.
   MethodTrainer(std::shared_ptr<const Tracer> tracer, const TrainSettings& settings, std::filesystem::path init,
-                bool use_samples, bool quiet)
+                bool use_samples, std::optional<Objective> objective, bool quiet)
       : m_tracer(std::move(tracer)),
         m_settings(settings),
         m_init(std::move(init)),
         m_use_samples(use_samples),
+        m_objective(objective),
         m_quiet(quiet) {}
   PreparedMethod prepare(const Method& method);
 
@@ -52,7 +56,9 @@ class MethodTrainer {
   std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;
   std::filesystem::path m_init;
-  bool m_use_samples, m_quiet;
+  bool m_use_samples;
+  std::optional<Objective> m_objective;
+  bool m_quiet;
   std::map<std::string, std::shared_ptr<const Candidates>> m_candidates;  // by layout
 };
 

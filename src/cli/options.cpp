@@ -70,6 +70,11 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   return result;
 }
 
+std::optional<Objective> RenderOptions::objective() const {
+  if (objective_name == "even") return std::nullopt;
+  return objective_name == "mse" ? Objective::mse : Objective::relmse;
+}
+
 Scene load_scene(const CommonOptions& common, const RenderOptions* render) {
   Scene scene = load_scene(common.scene, common.scene_options());
   if (render && !render->crop.empty()) {

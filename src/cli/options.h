@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "estimate/allocation.h"
 #include "warpath/train.h"
 
 namespace warpath {
@@ -45,8 +46,11 @@ struct TrainingOptions {
 struct RenderOptions {
   std::optional<int> spp;
   std::optional<double> time;
-  std::string crop;  ///< X,Y,W,H
-  std::string aov;   ///< albedo,normal,depth
+  std::string crop;                       ///< X,Y,W,H
+  std::string aov;                        ///< albedo,normal,depth
+  std::string objective_name = "relmse";  ///< mse, relmse or even
+
+  std::optional<Objective> objective() const;  ///< none for `even`
 };
 
 /// Loads the scene as the options ask for it; crop is applied to its film.

@@ -22,13 +22,13 @@ void run(const RenderCommand& command) {
 
   const TrainingOptions& training = command.training;
   MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
-                        common.quiet);
-  const PreparedMethod prepared = trainer.prepare(method);
+                        command.render.objective(), common.quiet);
+  PreparedMethod prepared = trainer.prepare(method);
   ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed);
   {
     prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);
-    render_passes(estimator, budget, progress.callback(), [] {});
+    render_passes(estimator, budget, prepared.guide, progress.callback(), [] {});
   }
   if (estimator.cost().samples == 0) throw Interrupted{};
 

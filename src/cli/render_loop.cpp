@@ -9,34 +9,58 @@ namespace warpath {
 
 using Clock = std::chrono::steady_clock;
 
-void render_passes(ImageEstimator& estimator, const Budget& budget, const Progress& progress,
-                   const std::function<void()>& checkpoint) {
+namespace {
+
+double seconds_since(Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); }
+
+/// One pass; what it teaches goes into the guide if another is to follow.
+void add_pass(ImageEstimator& estimator, int spp, bool last, Guide& guide, const Progress& progress,
+              const std::function<bool()>& stop) {
+  if (guide.empty()) return estimator.add_pass(spp, progress, stop);
+  const bool learns = guide.trainer && !last;
+  const std::uint64_t before = estimator.cost().samples;
+  estimator.add_guided_pass(spp, {guide.warp.get(), learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
+                            stop);
+  if (!learns || g_interrupted) return;
   const auto start = Clock::now();
-  const auto until = [&](Clock::time_point then) { return std::chrono::duration<double>(then - Clock::now()).count(); };
-  const double whole = budget.deadline ? std::max(1e-3, until(*budget.deadline)) : 1;
+  guide.warp = guide.trainer->fit();
+  guide.taught += estimator.cost().samples - before;
+  guide.fit_seconds += seconds_since(start);
+}
+
+}  // namespace
+
+void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide, const Progress& progress,
+                   const std::function<void()>& checkpoint) {
+  const auto left = [&] { return -seconds_since(*budget.deadline); };
+  const double whole = budget.deadline ? std::max(1e-3, left()) : 1;
+  double per_spp = 0;  // seconds, of the pass before
   int done = 0;
   while (!g_interrupted) {
     int next = std::max(1, done);
+    bool last;
     if (budget.deadline) {
-      const double left = until(*budget.deadline);
+      last = false;
       if (done > 0) {
-        // The first passes are slow (cold caches), so a little is left over: it goes into the pass after the next.
-        const double per_spp = std::chrono::duration<double>(Clock::now() - start).count() / done;
-        const int fits = static_cast<int>(std::min(left / per_spp, 1e8));
+        const int fits = static_cast<int>(std::min(left() / per_spp, 1e8));
         if (fits < 1) break;
-        next = 2 * next > fits ? fits : next;
+        last = 2 * next > fits;
+        if (last) next = fits;
       }
     } else {
       next = std::min(next, budget.spp - done);
       if (next == 0) break;
+      last = done + next == budget.spp;
     }
     const int before = done;
     const auto report = [&](double fraction) {
       if (!progress) return;
-      progress(budget.deadline ? 1 - until(*budget.deadline) / whole : (before + fraction * next) / budget.spp);
+      progress(budget.deadline ? 1 - left() / whole : (before + fraction * next) / budget.spp);
     };
     const auto stop = [&] { return budget.deadline && before > 0 && Clock::now() > *budget.deadline; };
-    estimator.add_pass(next, report, stop);
+    const auto start = Clock::now();
+    add_pass(estimator, next, last, guide, report, stop);
+    per_spp = seconds_since(start) / next;
     done += next;
     checkpoint();
   }

@@ -5,6 +5,7 @@
 
 #include "core/ordered.h"
 #include "estimate/image_estimator.h"
+#include "train/field_trainer.h"
 
 namespace warpath {
 
@@ -14,9 +15,19 @@ struct Budget {
   std::optional<std::chrono::steady_clock::time_point> deadline;
 };
 
+/// What passes hand on to those that follow.
+struct Guide {
+  std::optional<Objective> objective{};      ///< where samples go; else every pixel has as many
+  std::shared_ptr<const VertexWarp> warp{};  ///< draws the numbers of vertices; null: they are uniform
+  std::unique_ptr<FieldTrainer> trainer{};   ///< learns the warp from each pass for the next; null: it stays
+  double fit_seconds = 0;                    ///< spent between passes
+  std::uint64_t taught = 0;                  ///< paths that the warp has learned from
+  bool empty() const { return !objective && !warp && !trainer; }
+};
+
 /// Renders in passes that double what is there, so that an image that ends early is even, and calls `checkpoint` after
-/// each. Ends early on Ctrl-C.
-void render_passes(ImageEstimator& estimator, const Budget& budget, const Progress& progress,
+/// each. Every pass uses what the guide has learned from those before, and counts in the image. Ends early on Ctrl-C.
+void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide, const Progress& progress,
                    const std::function<void()>& checkpoint);
 
 }  // namespace warpath

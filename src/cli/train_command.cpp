@@ -18,7 +18,7 @@ void run(const TrainCommand& command) {
         "--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree or realnvp", command.warp));
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
   const TrainSettings settings = command.training.train_settings(common.seed);
-  MethodTrainer trainer(tracer, settings, command.training.init, false, common.quiet);
+  MethodTrainer trainer(tracer, settings, command.training.init, false, std::nullopt, common.quiet);
   const PreparedMethod prepared = trainer.prepare(method);
 
   WarpFile file{prepared.proposal, method.layout, tracer->scene().file.filename().string(), {}};

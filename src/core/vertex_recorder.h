@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "core/primary_source.h"
@@ -29,6 +30,16 @@ class VertexRecorder {
  public:
   virtual ~VertexRecorder() = default;
   virtual void record(const VertexRecords& records) = 0;
+};
+
+/// Learns from the vertices of a pass. Every batch is recorded by a recorder of its own, and recorders are merged one
+/// at a time, in the order of the batches, so that what is learned does not depend on the number of threads.
+class VertexLearner {
+ public:
+  virtual ~VertexLearner() = default;
+  virtual std::unique_ptr<VertexRecorder> make_recorder() const = 0;
+  /// Takes what one batch left in a recorder that make_recorder() made, and empties it.
+  virtual void merge(VertexRecorder& recorder) = 0;
 };
 
 }  // namespace warpath

@@ -20,7 +20,7 @@ Film::Film(const FilmSettings& settings, Weights weights)
   m_weight_y.resize(taps);
 }
 
-void Film::add(float x, float y, const Color& value) {
+void Film::add(float x, float y, const Color& value, float weight) {
   ++m_samples;
   Color f = value;
   if (!std::isfinite(f.x + f.y + f.z)) {
@@ -44,7 +44,7 @@ void Film::add(float x, float y, const Color& value) {
         own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(i) + 0.5f - x);
   for (int j = y0; j <= y1; ++j)
     m_weight_y[static_cast<std::size_t>(j - y0)] =
-        own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(j) + 0.5f - y);
+        weight * (own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(j) + 0.5f - y));
 
   for (int j = y0; j <= y1; ++j)
     for (int i = x0; i <= x1; ++i) {

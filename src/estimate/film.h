@@ -27,11 +27,14 @@ class Film {
   Film(const FilmSettings& settings, Weights weights);
 
   /// One sample at (x, y), in pixels from the corner of the crop window. A value that is not finite counts as 0, stays
-  /// in the divisor, and is counted.
-  void add(float x, float y, const Color& value);
+  /// in the divisor, and is counted. weight: one over how densely its pixel is sampled, so that pixels with many
+  /// samples do not drown their neighbours in filters that reach over; 1 if all are alike.
+  void add(float x, float y, const Color& value, float weight = 1);
   /// Samples that fell at (x, y) with value 0 and need no splat under Weights::expected.
   void count(std::uint64_t samples) { m_samples += samples; }
 
+  int width() const { return m_width; }
+  int height() const { return m_height; }
   std::uint64_t samples() const { return m_samples; }
   std::uint64_t non_finite() const { return m_non_finite; }
   ImageEstimate develop() const;

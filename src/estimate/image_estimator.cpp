@@ -6,6 +6,7 @@
 
 #include "core/rng.h"
 #include "estimate/film_positions.h"
+#include "estimate/vertex_source.h"
 #include "estimate/warped_source.h"
 #include "warpath/error.h"
 
@@ -25,6 +26,7 @@ constexpr int kEmissionRays = 4;
 // Streams of one seed that must not repeat each other's numbers.
 constexpr std::uint64_t kLatentStream = 0x6c6174656e740001u;
 constexpr std::uint64_t kEmissionStream = 0x656d697373690002u;
+constexpr std::uint64_t kAllocationStream = 0x616c6c6f63610005u;
 // Numbers of a latent's stream beyond those that stand for the dimensions of a path.
 constexpr std::uint32_t kComponentDimension = 0xfffffffeu;
 
@@ -34,7 +36,9 @@ struct Job {
   std::vector<std::uint32_t> pixels;
   Matrix<double> y;
   std::vector<double> u, log_q;
-  std::vector<float> inv_q, film_x, film_y;
+  std::vector<float> inv_q, film_x, film_y, weight;
+  VertexSourceScratch vertices;
+  std::unique_ptr<VertexRecorder> recorder;
   PathResults results;
   double warp_seconds = 0, trace_seconds = 0;
 };
@@ -64,10 +68,13 @@ std::vector<std::uint8_t> dilate(const std::vector<std::uint8_t>& mask, int widt
   return wide;
 }
 
-void add_to_film(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t lanes) {
+/// weight: one per lane, or empty if all are 1.
+void add_to_film(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t lanes,
+                 std::span<const float> weight = {}) {
   const auto crop_x = static_cast<float>(settings.crop_x), crop_y = static_cast<float>(settings.crop_y);
   for (std::size_t i = 0; i < lanes; ++i)
-    film.add(results.film_x[i] - crop_x, results.film_y[i] - crop_y, results.radiance[i]);
+    film.add(results.film_x[i] - crop_x, results.film_y[i] - crop_y, results.radiance[i],
+             weight.empty() ? 1.0f : weight[i]);
 }
 
 }  // namespace
@@ -83,6 +90,7 @@ ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_
   if (m_proposal) WARPATH_CHECK_EQ(m_proposal->dims(), m_layout.dims());
   const FilmSettings& film = tracer.scene().film;
   m_pixels = tiled_pixels(film.crop_width, film.crop_height);
+  m_begun.resize(m_pixels.size());
   const int reach = static_cast<int>(std::ceil(film.filter.radius + 0.5f));
   const auto may_see = dilate(tracer.may_see_emission(), film.crop_width, film.crop_height, reach);
   for (const std::uint32_t pixel : m_pixels)
@@ -92,39 +100,58 @@ ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_
 
 void ImageEstimator::add_pass(int spp, const Progress& progress, const std::function<bool()>& stop) {
   add_emission_pass(spp, stop);
-  add_paths(spp, progress, stop);
+  add_paths(spp, {}, progress, stop);
 }
 
-void ImageEstimator::add_paths(int spp, const Progress& progress, const std::function<bool()>& stop) {
+void ImageEstimator::add_guided_pass(int spp, const Guidance& guidance, const Progress& progress,
+                                     const std::function<bool()>& stop) {
+  WARPATH_CHECK(!m_proposal && !m_joint);
+  add_emission_pass(spp, stop);
+  if (!m_moments) m_moments.emplace(m_film.width(), m_film.height());
+  add_paths(spp, guidance, progress, stop);
+}
+
+void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress& progress,
+                               const std::function<bool()>& stop) {
   const FilmSettings& film = m_tracer.scene().film;
-  const std::size_t pixels = m_pixels.size(), per_pixel = static_cast<std::size_t>(spp);
+  const std::size_t pixels = m_pixels.size();
   const auto dims = static_cast<std::size_t>(m_layout.dims());
   const auto first = static_cast<std::uint64_t>(m_passes_spp);
   const std::uint64_t latent_seed = mix64(m_seed ^ kLatentStream);
-  m_passes_spp += spp;
 
-  // Stratified film: a batch is a run of pixels, all samples of each, or a part of the samples of a few pixels.
-  const std::size_t run = std::clamp<std::size_t>(kBatch / per_pixel, kTile, kBatch);
-  const std::size_t depth = std::min(per_pixel, std::max<std::size_t>(1, kBatch / run));
-  const std::size_t runs = (pixels + run - 1) / run, layers = (per_pixel + depth - 1) / depth;
-  const std::size_t total = pixels * per_pixel;
-  const std::size_t batches = m_joint ? (total + kBatch - 1) / kBatch : runs * layers;
+  // Stratified film: all samples of a pixel stand together, and pixels in the order of m_pixels: begin[k] is the first
+  // sample of the k-th.
+  std::vector<std::uint32_t> counts;
+  std::vector<std::uint64_t> begin;
+  if (!m_joint) {
+    counts.assign(pixels, static_cast<std::uint32_t>(spp));
+    if (guidance.objective && m_passes_spp > 0)
+      counts = m_moments->allocate(spp, *guidance.objective,
+                                   sample_double(sample_key(m_seed ^ kAllocationStream, first), 0));
+    begin.assign(1, 0);
+    for (const std::uint32_t pixel : m_pixels) begin.push_back(begin.back() + counts[pixel]);
+  }
+  const std::size_t total = m_joint ? pixels * static_cast<std::size_t>(spp) : begin.back();
+  const std::size_t batches = (total + kBatch - 1) / kBatch;
+  m_passes_spp += spp;
 
   const auto number_samples = [&](Job& job, std::size_t batch) {
     job.ids.clear();
     job.pixels.clear();
+    job.weight.clear();
+    const std::size_t from = batch * kBatch, to = std::min(total, from + kBatch);
     if (m_joint) {
-      const std::size_t begin = batch * kBatch, end = std::min(total, begin + kBatch);
-      for (std::size_t i = begin; i < end; ++i) job.ids.push_back(first * pixels + i);
+      for (std::size_t i = from; i < to; ++i) job.ids.push_back(first * pixels + i);
       return;
     }
-    const std::size_t p0 = batch / layers * run, p1 = std::min(pixels, p0 + run);
-    const std::size_t s0 = batch % layers * depth, s1 = std::min(per_pixel, s0 + depth);
-    for (std::size_t s = s0; s < s1; ++s)
-      for (std::size_t p = p0; p < p1; ++p) {
-        job.ids.push_back((first + s) * pixels + m_pixels[p]);
-        job.pixels.push_back(m_pixels[p]);
-      }
+    auto k = static_cast<std::size_t>(std::upper_bound(begin.begin(), begin.end(), from) - begin.begin()) - 1;
+    for (std::size_t i = from; i < to; ++i) {
+      while (i >= begin[k + 1]) ++k;
+      const std::uint32_t pixel = m_pixels[k];
+      job.ids.push_back((m_begun[pixel] + (i - begin[k])) * pixels + pixel);
+      job.pixels.push_back(pixel);
+      if (guidance.objective) job.weight.push_back(static_cast<float>(spp) / static_cast<float>(counts[pixel]));
+    }
   };
   const auto place_on_film = [&](Job& job) {
     const std::uint32_t d = Group{GroupKind::film}.first_dimension();
@@ -165,22 +192,32 @@ void ImageEstimator::add_paths(int spp, const Progress& progress, const std::fun
     }
     job.warp_seconds = m_proposal ? seconds_since(begin) : 0;
     if (!m_joint) place_on_film(job);
-    static const Layout uniform;
-    WarpedSource source(m_seed, job.ids, m_proposal ? m_layout : uniform, job.y.batch(),
-                        m_proposal ? std::span<const float>(job.inv_q) : std::span<const float>(), job.film_x,
-                        job.film_y);
-    m_tracer.trace(source, n, job.results);
+    if (guidance.learner && !job.recorder) job.recorder = guidance.learner->make_recorder();
+    if (guidance.warp) {
+      VertexSource source(m_seed, job.ids, *guidance.warp, job.film_x, job.film_y, job.vertices);
+      m_tracer.trace(source, n, job.results, job.recorder.get());
+    } else {
+      static const Layout uniform;
+      WarpedSource source(m_seed, job.ids, m_proposal ? m_layout : uniform, job.y.batch(),
+                          m_proposal ? std::span<const float>(job.inv_q) : std::span<const float>(), job.film_x,
+                          job.film_y);
+      m_tracer.trace(source, n, job.results, job.recorder.get());
+    }
     job.trace_seconds = seconds_since(begin) - job.warp_seconds;
   };
   const auto merge = [&](Job& job, std::size_t batch) {
     const auto begin = Clock::now();
-    add_to_film(m_film, film, job.results, job.ids.size());
+    add_to_film(m_film, film, job.results, job.ids.size(), job.weight);
+    if (m_moments)
+      for (std::size_t i = 0; i < job.pixels.size(); ++i) m_moments->add(job.pixels[i], job.results.radiance[i]);
+    if (job.recorder) guidance.learner->merge(*job.recorder);
     m_cost.samples += job.ids.size();
     warp_seconds += job.warp_seconds;
     trace_seconds += job.trace_seconds + seconds_since(begin);
     if (progress) progress(static_cast<double>(batch + 1) / static_cast<double>(batches));
   };
   run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });
+  for (std::size_t p = 0; p < counts.size(); ++p) m_begun[p] += counts[p];
 
   const double wall = seconds_since(start), thread_time = std::max(1e-12, warp_seconds + trace_seconds);
   m_cost.warp_seconds += wall * warp_seconds / thread_time;

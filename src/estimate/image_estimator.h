@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "core/ordered.h"
+#include "core/vertex_recorder.h"
+#include "estimate/allocation.h"
 #include "estimate/film.h"
 #include "tracer/tracer.h"
+#include "warp/vertex_warp.h"
 #include "warpath/layout.h"
 #include "warpath/warp.h"
 
@@ -21,6 +24,13 @@ struct RenderCost {
   double trace_seconds = 0;         ///< tracing and splatting
   double emission_seconds = 0;
   double total() const { return warp_seconds + trace_seconds + emission_seconds; }
+};
+
+/// What a pass over a stratified film is told by the passes before it.
+struct Guidance {
+  const VertexWarp* warp = nullptr;      ///< draws the numbers of vertices; null: they are uniform
+  VertexLearner* learner = nullptr;      ///< is shown all vertices
+  std::optional<Objective> objective{};  ///< samples go where it says; else every pixel has as many
 };
 
 /// Renders one image with one proposal, pass after pass.  [ZZ19, the warped estimator: C(y) W_j / q(y)]
@@ -38,6 +48,11 @@ class ImageEstimator {
   /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
+  /// The same with guidance; the proposal must be null. Every pass weighs by its samples per pixel, the same in every
+  /// pixel, so samples may be placed by what earlier ones found.
+  void add_guided_pass(int spp, const Guidance& guidance, const Progress& progress = {},
+                       const std::function<bool()>& stop = {});
+
   /// Adds 4 x `spp` camera rays to each pixel that may see an emitter, and no path.
   void add_emission_pass(int spp, const std::function<bool()>& stop = {});
 
@@ -53,7 +68,7 @@ class ImageEstimator {
   const RenderCost& cost() const { return m_cost; }
 
  private:
-  void add_paths(int spp, const Progress& progress, const std::function<bool()>& stop);
+  void add_paths(int spp, const Guidance& guidance, const Progress& progress, const std::function<bool()>& stop);
 
   const Tracer& m_tracer;
   Layout m_layout;
@@ -64,7 +79,9 @@ class ImageEstimator {
   std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
   Film m_film;
   std::optional<Film> m_emission, m_uniform;
-  int m_passes_spp = 0;  // samples per pixel begun so far: numbers the samples
+  std::optional<PixelMoments> m_moments;  // of guided passes
+  std::vector<std::uint32_t> m_begun;     // samples begun so far in each pixel: numbers them; not of a warped film
+  int m_passes_spp = 0;                   // samples per pixel begun so far on average
   std::uint64_t m_emission_rays = 0;
   RenderCost m_cost;
 };

@@ -42,6 +42,7 @@ Tracer::Tracer(Scene scene) : m_impl(std::make_unique<const Impl>(std::move(scen
 Tracer::~Tracer() = default;
 
 const Scene& Tracer::scene() const { return m_impl->compiled.scene; }
+int Tracer::emitters() const { return static_cast<int>(m_impl->compiled.emitters.size()); }
 const std::vector<std::uint8_t>& Tracer::may_see_emission() const { return m_impl->emission_mask; }
 
 void Tracer::trace(PrimarySource& source, std::size_t lanes, PathResults& results, VertexRecorder* recorder) const {

@@ -32,6 +32,7 @@ class Tracer {
   explicit Tracer(Scene scene);
   ~Tracer();
   const Scene& scene() const;
+  int emitters() const;  ///< from how many the number `light` chooses
 
   /// Paths of `lanes` samples, without directly seen emission. Best with batches of 1,024 to 4,096.
   void trace(PrimarySource& source, std::size_t lanes, PathResults& results, VertexRecorder* recorder = nullptr) const;

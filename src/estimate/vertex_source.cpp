@@ -1,0 +1,57 @@
+#include "estimate/vertex_source.h"
+
+#include <algorithm>
+
+#include "core/rng.h"
+
+namespace warpath {
+
+void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
+                                const VertexContext& context, float* inv_q) {
+  const std::size_t n = lanes.size();
+  for (auto& z : m_scratch.z) z.resize(std::max(z.size(), n));
+  for (auto& y : m_scratch.y) y.resize(std::max(y.size(), n));
+  const std::uint32_t d = first.first_dimension();
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint64_t key = sample_key(m_seed, m_ids[lanes[i]]);
+    for (std::uint32_t a = 0; a < 3; ++a) m_scratch.z[a][i] = sample_double(key, d + a);
+  }
+  const auto& [z, y] = m_scratch;
+  m_warp.sample(which, context, n, {z[0].data(), z[1].data(), z[2].data()},
+                {m_scratch.y[0].data(), m_scratch.y[1].data(), m_scratch.y[2].data()}, inv_q);
+  m_drawn = first;
+}
+
+bool VertexSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
+                        float* u1, float* inv_q) {
+  const std::size_t n = lanes.size();
+  switch (group.kind) {
+    case GroupKind::film:
+      for (std::size_t i = 0; i < n; ++i) {
+        u0[i] = m_film_x[lanes[i]];
+        u1[i] = m_film_y[lanes[i]];
+      }
+      return false;
+    case GroupKind::light:
+    case GroupKind::lobe:
+      draw_jointly(group.kind == GroupKind::light ? VertexNumbers::light : VertexNumbers::scatter, group, lanes,
+                   *context, inv_q);
+      std::copy_n(m_scratch.y[0].begin(), n, u0);
+      return true;
+    case GroupKind::light_uv:
+    case GroupKind::dir: {
+      const bool is_light = group.kind == GroupKind::light_uv;
+      const Group first{is_light ? GroupKind::light : GroupKind::lobe, group.bounce};
+      const bool drawn = m_drawn == first;
+      // A scene with one emitter has no choice to draw.
+      if (!drawn) draw_jointly(is_light ? VertexNumbers::light : VertexNumbers::scatter, first, lanes, *context, inv_q);
+      std::copy_n(m_scratch.y[1].begin(), n, u0);
+      std::copy_n(m_scratch.y[2].begin(), n, u1);
+      return !drawn;
+    }
+    default:
+      return UniformSource::draw(group, lanes, context, u0, u1, inv_q);
+  }
+}
+
+}  // namespace warpath

@@ -1,0 +1,51 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/primary_source.h"
+#include "warp/vertex_warp.h"
+
+namespace warpath {
+
+/// Memory of a VertexSource, kept from batch to batch.
+struct VertexSourceScratch {
+  std::array<std::vector<double>, 3> z;
+  std::array<std::vector<float>, 3> y;
+};
+
+/// From a warp that lives at vertices to the numbers of a path: film positions as they are given, the numbers of each
+/// vertex from the warp, roulette and the rest uniform. What is drawn jointly is drawn with the first group of the
+/// three numbers, which brings the whole 1 / q; the second group hands out the rest.
+class VertexSource final : public UniformSource {
+ public:
+  /// Views: film positions in [0,1), one per lane.
+  VertexSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const VertexWarp& warp,
+               std::span<const float> film_x, std::span<const float> film_y, VertexSourceScratch& scratch)
+      : UniformSource(seed, ids),
+        m_seed(seed),
+        m_ids(ids),
+        m_warp(warp),
+        m_film_x(film_x),
+        m_film_y(film_y),
+        m_scratch(scratch) {}
+
+  bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
+            float* inv_q) override;
+  bool wants_context() const override { return true; }
+
+ private:
+  /// Draws three numbers for each lane into m_scratch.y; `first` is the first of the two groups that hold them.
+  void draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
+                    const VertexContext& context, float* inv_q);
+
+  std::uint64_t m_seed;
+  std::span<const std::uint64_t> m_ids;
+  const VertexWarp& m_warp;
+  std::span<const float> m_film_x, m_film_y;
+  VertexSourceScratch& m_scratch;
+  Group m_drawn{GroupKind::film};  // the group that was drawn last together with its second one
+};
+
+}  // namespace warpath

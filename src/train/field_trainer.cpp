@@ -1,0 +1,222 @@
+#include "train/field_trainer.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+constexpr std::uint16_t kNoBin = 0xffff;
+
+constexpr std::size_t kFeatures = FieldTree::kFeatures;
+
+/// Whether what is scattered depends on where the path came from.
+bool follows_direction(SurfaceKind kind) { return kind != SurfaceKind::diffuse && kind != SurfaceKind::null; }
+
+}  // namespace
+
+/// What a batch leaves: one entry for each vertex.
+class FieldTrainer::Recorder final : public VertexRecorder {
+ public:
+  struct Entry {
+    std::uint32_t root_key, cell;
+    std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
+    float light_moment, scatter_moment;
+    FieldTree::Features at;
+  };
+  explicit Recorder(const FieldTrainer& trainer) : m_trainer(trainer) {}
+
+  void record(const VertexRecords& records) override {
+    const FieldGrids& grids = m_trainer.m_grids;
+    const auto& u = records.numbers;
+    // f^2 / q of a term t = f / q.
+    const auto moment = [](float term, float inv_q) {
+      const float m = term * term / inv_q;
+      return std::isfinite(m) ? m : 0.0f;
+    };
+    for (std::size_t i = 0; i < records.lanes.size(); ++i) {
+      Entry entry;
+      entry.root_key = FieldTree::root_key(records.context, i);
+      entry.at = FieldTree::features(records.context, i);
+      entry.cell = m_trainer.m_tree.cell(entry.root_key, entry.at);
+      const auto kind = static_cast<SurfaceKind>(records.context.kind[i]);
+      const bool lit = kind != SurfaceKind::delta && kind != SurfaceKind::null;
+      entry.light_bin = lit ? static_cast<std::uint16_t>(grids.light.bin(u[0][i], u[1][i], u[2][i])) : kNoBin;
+      entry.scatter_bin =
+          static_cast<std::uint16_t>(grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]));
+      entry.light_moment = moment(records.light[i], records.inv_q_light[i]);
+      entry.scatter_moment = moment(records.beyond[i], records.inv_q_scatter[i]);
+      entries.push_back(entry);
+    }
+  }
+
+  std::vector<Entry> entries;
+
+ private:
+  const FieldTrainer& m_trainer;
+};
+
+FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
+    : m_settings(settings), m_grids(light_parts) {}
+
+std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const { return std::make_unique<Recorder>(*this); }
+
+void FieldTrainer::add_root(std::uint32_t key) {
+  m_tree.add_root(key);
+  m_cells.emplace_back().kind = FieldTree::kind_of(key);
+  m_light.resize(m_cells.size() * m_grids.light.bins());
+  m_scatter.resize(m_cells.size() * m_grids.diffuse.bins());
+}
+
+void FieldTrainer::merge(VertexRecorder& recorder) {
+  auto& entries = static_cast<Recorder&>(recorder).entries;
+  constexpr std::size_t kAhead = 16;
+  const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (i + kAhead < entries.size()) {
+      const Recorder::Entry& next = entries[i + kAhead];
+      if (next.cell != FieldTree::kNoCell) {
+        if (next.light_bin != kNoBin) __builtin_prefetch(&m_light[next.cell * light_bins + next.light_bin], 1);
+        __builtin_prefetch(&m_scatter[next.cell * scatter_bins + next.scatter_bin], 1);
+      }
+    }
+    Recorder::Entry& e = entries[i];
+    if (e.cell == FieldTree::kNoCell) {
+      // Either new altogether, or another entry has brought it in since this one was recorded.
+      e.cell = m_tree.cell(e.root_key, e.at);
+      if (e.cell == FieldTree::kNoCell) {
+        e.cell = m_tree.cells();
+        add_root(e.root_key);
+      }
+    }
+    Cell& cell = m_cells[e.cell];
+    cell.visits += 1;
+    for (std::size_t k = 0; k < FieldTree::kFeatures; ++k) {
+      cell.sum[k] += e.at[k];
+      cell.square[k] += static_cast<double>(e.at[k]) * e.at[k];
+    }
+    if (e.light_bin != kNoBin) {
+      Bin& bin = m_light[e.cell * light_bins + e.light_bin];
+      bin.moment += e.light_moment;
+      bin.draws += 1;
+      cell.light_draws += 1;
+    }
+    Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
+    bin.moment += e.scatter_moment;
+    bin.draws += 1;
+    cell.scatter_draws += 1;
+  }
+  entries.clear();
+}
+
+void FieldTrainer::cut_cells() {
+  double n = 0;
+  std::array<double, kFeatures> sum{}, square{};
+  for (const Cell& cell : m_cells) {
+    n += cell.visits;
+    for (std::size_t k = 0; k < kFeatures; ++k) sum[k] += cell.sum[k], square[k] += cell.square[k];
+  }
+  // An angle seen from a distance that is typical of the scene is as wide as this on a surface.
+  double extent2 = 0;
+  for (std::size_t k = 0; k < 3; ++k) extent2 += std::max(0.0, square[k] / n - (sum[k] / n) * (sum[k] / n));
+  // Cells that are new are looked at in their turn: they may still be too large.
+  for (std::uint32_t cell = 0; cell < m_cells.size(); ++cell)
+    while (m_cells[cell].visits > m_settings.split_at && m_cells.size() < m_settings.max_cells && cut(cell, extent2)) {
+    }
+}
+
+bool FieldTrainer::cut(std::uint32_t index, double extent2) {
+  const Cell parent = m_cells[index];  // a copy: m_cells grows
+  const double n = parent.visits;
+  std::array<double, kFeatures> mean, variance;
+  for (std::size_t k = 0; k < kFeatures; ++k) {
+    mean[k] = parent.sum[k] / n;
+    variance[k] = std::max(0.0, parent.square[k] / n - mean[k] * mean[k]);
+  }
+  std::size_t feature = 0;
+  const std::size_t features = follows_direction(parent.kind) ? kFeatures : 3;
+  const auto width = [&](std::size_t k) { return k < 3 ? variance[k] : variance[k] * extent2; };
+  for (std::size_t k = 1; k < features; ++k)
+    if (width(k) > width(feature)) feature = k;
+  if (!(width(feature) > 1e-9 * extent2)) return false;  // all in one place
+
+  const std::uint32_t upper = m_tree.split(index, feature, static_cast<float>(mean[feature]));
+  const auto halve = [&](std::vector<Bin>& bins, std::size_t size) {
+    bins.resize(bins.size() + size);
+    for (std::size_t b = 0; b < size; ++b) {
+      Bin& bin = bins[index * size + b];
+      bin.moment *= 0.5f, bin.draws *= 0.5f;
+      bins[upper * size + b] = bin;
+    }
+  };
+  halve(m_light, m_grids.light.bins());
+  halve(m_scatter, m_grids.diffuse.bins());
+  // The halves of vertices that lie evenly: where their means are, and how wide they are.
+  const double offset = std::sqrt(0.75 * variance[feature]);
+  const auto half = [&](double side) {
+    Cell cell = parent;
+    cell.visits *= 0.5, cell.light_draws *= 0.5, cell.scatter_draws *= 0.5;
+    for (std::size_t k = 0; k < kFeatures; ++k) {
+      const double m = k == feature ? mean[k] + side * offset : mean[k];
+      cell.sum[k] = m * cell.visits;
+      cell.square[k] = ((k == feature ? 0.25 : 1.0) * variance[k] + m * m) * cell.visits;
+    }
+    return cell;
+  };
+  m_cells[index] = half(-1);
+  m_cells.push_back(half(1));
+  return true;
+}
+
+void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws,
+                               std::span<float> left) const {
+  const std::uint32_t count = grid.bins();
+  static thread_local std::vector<double> moment, drawn, volume, second_moment;
+  static thread_local std::vector<float> masses;
+  for (auto* heap : {&moment, &drawn, &volume, &second_moment}) heap->resize(2 * count);
+  masses.resize(count);
+  for (std::uint32_t b = 0; b < count; ++b) {
+    moment[count + b] = bins[b].moment;
+    drawn[count + b] = bins[b].draws;
+    volume[count + b] = grid.volume(b);
+  }
+  for (std::uint32_t node = count - 1; node > 0; --node)
+    for (auto* heap : {&moment, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
+  // Each half is drawn to the whole that it is part of, the more the fewer samples it has seen.
+  second_moment[1] = draws > 0 ? moment[1] / draws : 0;
+  double sum = 0;
+  for (std::uint32_t node = 2; node < 2 * count; ++node) {
+    const double whole = second_moment[node / 2];
+    const double own = volume[node] > 0 && draws > 0 ? moment[node] / (draws * volume[node]) : 0;
+    second_moment[node] = (drawn[node] * own + m_settings.shrink * whole) / (drawn[node] + m_settings.shrink);
+    if (node >= count) sum += std::sqrt(second_moment[node]) * volume[node];
+  }
+  const double share = sum > 0 ? (1 - m_settings.uniform) * draws / (draws + m_settings.trust) : 0;
+  for (std::uint32_t b = 0; b < count; ++b)
+    masses[b] = static_cast<float>(volume[count + b] *
+                                   (1 - share + (share > 0 ? share * std::sqrt(second_moment[count + b]) / sum : 0)));
+  halving_probabilities(masses, left);
+}
+
+std::shared_ptr<const Field> FieldTrainer::fit() {
+  if (!m_cells.empty()) cut_cells();
+  const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
+  std::vector<float> light(m_cells.size() * light_bins), scatter(m_cells.size() * scatter_bins);
+  tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
+    const Cell& cell = m_cells[c];
+    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light_draws,
+                std::span(light).subspan(c * light_bins, light_bins));
+    fit_density(m_grids.grid(VertexNumbers::scatter, cell.kind),
+                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), cell.scatter_draws,
+                std::span(scatter).subspan(c * scatter_bins, scatter_bins));
+  });
+  std::vector<SurfaceKind> kinds;
+  for (const Cell& cell : m_cells) kinds.push_back(cell.kind);
+  return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter));
+}
+
+}  // namespace warpath

@@ -1,0 +1,61 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/vertex_recorder.h"
+#include "warp/field.h"
+
+namespace warpath {
+
+struct FieldSettings {
+  std::uint32_t max_cells = 1 << 14;
+  double split_at = 1000;  ///< vertices in a cell after which it is cut in two
+  double shrink = 16;      ///< a bin's second moment is drawn to that of the bins around it as if by so many samples
+  double uniform = 0.15;   ///< share of uniform numbers in every cell; more in cells of few vertices
+  double trust = 64;       ///< vertices in a cell that count as much as the uniform density
+};
+
+/// Learns a field from the vertices of passes. The density of a cell goes with the square root of the second moment of
+/// what comes back, the density that makes the variance of the whole remaining path least.  [Vorba et al. 2019, Path
+/// Guiding in Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding]
+class FieldTrainer final : public VertexLearner {
+ public:
+  /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
+  FieldTrainer(const FieldSettings& settings, int light_parts);
+
+  std::unique_ptr<VertexRecorder> make_recorder() const override;
+  void merge(VertexRecorder& recorder) override;
+  /// The field after all passes so far; cells that have seen many vertices are cut for the passes to come.
+  std::shared_ptr<const Field> fit();
+
+ private:
+  class Recorder;
+
+  /// Sums over vertices.
+  struct Cell {
+    SurfaceKind kind;
+    double visits = 0, light_draws = 0, scatter_draws = 0;
+    std::array<double, FieldTree::kFeatures> sum{}, square{};  // of features
+  };
+  struct Bin {
+    float moment = 0;  // sum of f^2 / q: over the draws, times the bin's volume, the second moment in the bin
+    float draws = 0;
+  };
+
+  void add_root(std::uint32_t key);
+  void cut_cells();
+  /// extent2: squared width of the scene. Returns false if all vertices of the cell are in one place.
+  bool cut(std::uint32_t cell, double extent2);
+  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws, std::span<float> left) const;
+
+  FieldSettings m_settings;
+  FieldGrids m_grids;
+  FieldTree m_tree;
+  std::vector<Cell> m_cells;
+  std::vector<Bin> m_light, m_scatter;  // bins() for each cell
+};
+
+}  // namespace warpath

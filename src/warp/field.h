@@ -1,0 +1,53 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "warp/field_tree.h"
+#include "warp/halving_density.h"
+#include "warp/vertex_warp.h"
+
+namespace warpath {
+
+/// How a field cuts the numbers of a vertex.
+struct FieldGrids {
+  /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
+  explicit FieldGrids(int light_parts);
+  const HalvingGrid& grid(VertexNumbers which, SurfaceKind kind) const {
+    return which == VertexNumbers::light  ? light
+           : kind == SurfaceKind::diffuse ? diffuse
+           : kind == SurfaceKind::delta   ? delta
+                                          : mixed;
+  }
+  int light_parts;
+  HalvingGrid light, diffuse, mixed, delta;
+};
+
+/// A field of densities in world space: a FieldTree whose cells each hold a piecewise-constant density over the numbers
+/// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers.
+class Field final : public VertexWarp {
+ public:
+  /// left: bins() probabilities for each cell, see HalvingGrid; each light grid, and each scatter grid, has as many.
+  Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<float> light_left,
+        std::vector<float> scatter_left);
+
+  std::string family() const override { return "field"; }
+  void sample(VertexNumbers which, const VertexContext& context, std::size_t n, const std::array<const double*, 3>& z,
+              const std::array<float*, 3>& y, float* inv_q) const override;
+  void inverse_density(VertexNumbers which, const VertexContext& context, std::size_t n,
+                       const std::array<const float*, 3>& y, float* inv_q) const override;
+  void save(TensorFile& file, const std::string& prefix) const override;
+  /// Throws FileError.
+  static std::shared_ptr<const Field> load(const TensorFile& file, const std::string& prefix);
+
+  const FieldTree& tree() const { return m_tree; }
+
+ private:
+  const float* density(VertexNumbers which, std::uint32_t cell) const;
+
+  FieldTree m_tree;
+  FieldGrids m_grids;
+  std::vector<SurfaceKind> m_kinds;  // of each cell
+  std::vector<float> m_light_left, m_scatter_left;
+};
+
+}  // namespace warpath

@@ -1,0 +1,47 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace warpath {
+
+/// The unit cube of three numbers cut into equal bins by halvings, the numbers taking turns. Bins are numbered by the
+/// halvings that lead to them, the first as the highest bit; node i of the tree of halvings has the children 2i, 2i+1.
+class HalvingGrid {
+ public:
+  static constexpr int kMaxLevels = 12;
+  /// bits[a] halvings cut number a. parts: how many equal parts of the first number are in use, at most 2^bits[0]: its
+  /// bins are 1 / parts wide, so that they fit `parts` equally likely choices; those beyond do not exist.
+  explicit HalvingGrid(std::array<int, 3> bits, int parts = 0);
+
+  int levels() const { return m_levels; }
+  std::uint32_t bins() const { return 1u << m_levels; }  ///< those that do not exist included
+  int axis(int level) const { return m_axis[static_cast<std::size_t>(level)]; }
+  /// Volume of a bin: 0 if it does not exist.
+  float volume(std::uint32_t bin) const { return part_of(bin) < m_parts ? m_volume : 0; }
+  std::uint32_t bin(float y0, float y1, float y2) const;
+
+  /// y = the point that the density `left` sends the latent z to; returns 1 / q(y). left: for each node of the tree of
+  /// halvings, from index 1, the probability of its first half.
+  float sample(const float* left, const std::array<double, 3>& z, std::array<float, 3>& y) const;
+  /// 1 / q in a bin.
+  float inverse_density(const float* left, std::uint32_t bin) const;
+
+ private:
+  /// Which of the first number's parts a bin lies in.
+  std::uint32_t part_of(std::uint32_t bin) const;
+
+  int m_levels;
+  std::uint32_t m_parts;
+  float m_volume;  // of a bin that exists
+  std::array<int, 3> m_bits;
+  std::array<float, 3> m_scale;  // number -> place in units of its bins
+  std::array<double, 3> m_unit;  // and back
+  std::array<std::uint8_t, kMaxLevels> m_axis{};
+};
+
+/// Turns masses of bins (not negative; those of bins that do not exist are 0) into the probabilities of first halves.
+/// left: bins() entries, the first is not used.
+void halving_probabilities(std::span<const float> masses, std::span<float> left);
+
+}  // namespace warpath

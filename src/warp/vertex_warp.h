@@ -1,0 +1,34 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "core/primary_source.h"
+
+namespace warpath {
+
+class TensorFile;
+
+/// Numbers that are drawn as one at a vertex: three that choose the light and the point on it, or three that choose
+/// the lobe and the direction in it.
+enum class VertexNumbers : std::uint8_t { light, scatter };
+
+/// A density over the numbers of one vertex, given what the path knows there: a warp that lives at every vertex.
+/// Immutable and thread-safe.
+class VertexWarp {
+ public:
+  virtual ~VertexWarp() = default;
+  virtual std::string family() const = 0;
+  /// Draws the numbers of n vertices. z: three arrays of n uniform latents in [0,1); y: three arrays of n numbers in
+  /// [0,1); inv_q: n, 1 / q of the y that were handed out, given the context.
+  virtual void sample(VertexNumbers which, const VertexContext& context, std::size_t n,
+                      const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const = 0;
+  /// inv_q[i] = 1 / q(y[i] | context[i]).
+  virtual void inverse_density(VertexNumbers which, const VertexContext& context, std::size_t n,
+                               const std::array<const float*, 3>& y, float* inv_q) const = 0;
+  /// Puts tensors and metadata under names that start with `prefix`.
+  virtual void save(TensorFile& file, const std::string& prefix) const = 0;
+};
+
+}  // namespace warpath
