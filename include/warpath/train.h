@@ -8,19 +8,11 @@
 
 namespace warpath {
 
-/// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
-struct RealNvpSettings {
-  int couplings = 16;
-  int width = 32;
-  int blocks = 1;      ///< residual blocks of two dense layers in each of s and t
-  int bins = 15;       ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
-  bool shared = true;  ///< s and t from one network with two heads; the paper has two
-  /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that
-  /// any two dimensions come to stand on different sides.
-  enum class Masks { alternating, binary } masks = Masks::binary;
-  enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
+/// How a normalising flow is trained, whatever its layers are.
+struct FlowTraining {
   /// What training minimises: -ln q, the paper's maximum likelihood; or the variance of the estimate g / q, by way of
-  /// ln E[g / q] over examples that were drawn by g, with q mixed with `uniform`. The second one mends the tails.
+  /// ln E[g / q] over examples that were drawn by g, with q mixed with `uniform`: the chi-squared divergence of
+  /// [MMRGN19]. The second one mends the tails.
   enum class Loss { likelihood, variance } loss = Loss::variance;
   double rate = 6e-3;  ///< Adam's step size at the start; it falls when the held-out loss no longer does
   int batch = 2000;
@@ -32,9 +24,31 @@ struct RealNvpSettings {
   int patience = 3;    ///< evaluations without gain, after which the rate falls to a third, and at last training ends
   int rate_drops = 2;  ///< how often the rate falls
 };
+
+/// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
+struct RealNvpSettings : FlowTraining {
+  int couplings = 16;
+  int width = 32;
+  int blocks = 1;      ///< residual blocks of two dense layers in each of s and t
+  int bins = 15;       ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: logits alone
+  bool shared = true;  ///< s and t from one network with two heads; the paper has two
+  /// Which dimensions a coupling moves: every other one, or halves that change from pair to pair of couplings, so that
+  /// any two dimensions come to stand on different sides.
+  enum class Masks { alternating, binary } masks = Masks::binary;
+  enum class Norm { none, actnorm, batch } norm = Norm::actnorm;
+};
 /// The architecture that the authors of [ZZ19] released, and their training: 12 couplings, separate s and t, 512 wide,
 /// 8 blocks, maximum likelihood at rate 1e-4.
 RealNvpSettings released_realnvp();
+
+/// Settings of the rational-quadratic spline flow [DBMP19] and its training.
+struct SplineSettings : FlowTraining {
+  int couplings = 4;
+  int width = 64;          ///< neurons in a hidden layer, a multiple of 16
+  int blocks = 1;          ///< residual blocks of two dense layers in each coupling's network
+  int bins = 16;           ///< of each spline, 2 to 64
+  int encoding_bins = 16;  ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: the numbers alone
+};
 
 struct KdTreeSettings {
   enum class Target { mean, second_moment } target = Target::mean;  ///< density of a cell ~ mean g, or sqrt(E[g^2])
@@ -52,12 +66,13 @@ struct GridSettings {
 };
 
 struct TrainSettings {
-  std::string family = "realnvp";           ///< grid, kdtree, realnvp, uniform
+  std::string family = "realnvp";           ///< grid, kdtree, realnvp, spline, uniform
   std::uint64_t examples = 16 * 200 * 160;  ///< |S|; epp-k is k x 200 x 160
   double alpha = 8;                         ///< |T| / |S|
   double uniform = 0.1;                     ///< share of uniform samples in the mixture; 0 hands out the bare warp
   std::uint64_t seed = 0;
   RealNvpSettings realnvp;
+  SplineSettings spline;
   KdTreeSettings kdtree;
   GridSettings grid;
 };

@@ -277,4 +277,9 @@ double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objec
   return sum;
 }
 
+FlowOptimiser::Pass batch_norm_pass(const Flow& flow) {
+  return [&flow](const ExampleBlocks& batch, const Objective& objective, float* parameters, float* gradients,
+                 std::size_t slots) { return batch_norm_step(flow, batch, objective, parameters, gradients, slots); };
+}
+
 }  // namespace warpath::realnvp

@@ -2,7 +2,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "train/fit_realnvp_optimiser.h"
+#include "train/flow_optimiser.h"
+#include "warp/realnvp_flow.h"
 
 namespace warpath::realnvp {
 
@@ -38,5 +39,7 @@ class BatchNormPass {
 /// statistics in `parameters` are moved. gradients: `slots` arrays, parameter_count() apart, that sum up to them.
 double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objective& objective, float* parameters,
                        float* gradients, std::size_t slots);
+/// The same as what an optimiser calls; the flow must outlive it.
+FlowOptimiser::Pass batch_norm_pass(const Flow& flow);
 
 }  // namespace warpath::realnvp

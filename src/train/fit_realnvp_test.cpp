@@ -10,7 +10,8 @@
 
 #include "core/interrupt.h"
 #include "core/rng.h"
-#include "train/fit_realnvp_optimiser.h"
+#include "train/fit_realnvp_batch_norm.h"
+#include "train/flow_optimiser.h"
 #include "warp/check.h"
 #include "warp/realnvp.h"
 #include "warp/uniform.h"
@@ -70,7 +71,7 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     nn::AlignedVector<float> parameters(flow.parameter_count(), 0.0f);
     const auto views = flow.views();
     std::size_t known = 0;
-    for (const realnvp::ParameterView& view : views) {
+    for (const ParameterView& view : views) {
       if (view.name.ends_with("mean") || view.name.ends_with("variance")) continue;  // not what is trained
       ++known;
       const std::vector<float> values = run.at("parameters").at(view.name);
@@ -81,15 +82,17 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     ASSERT_EQ(known, run.at("parameters").size());
     const std::vector<float> y = run.at("y");
     const std::size_t count = y.size() / dims;
-    realnvp::ExampleBlocks batch;
+    ExampleBlocks batch;
     batch.resize(count, dims);
     for (std::size_t i = 0; i < count; ++i)
       batch.set(i, std::span(y).subspan(i * dims, dims), 1.0f / static_cast<float>(count), 0.0f);
-    realnvp::Optimiser optimiser(flow, parameters, 0.99);
+    s.average = 0.99;
+    FlowOptimiser optimiser(flow, parameters, s,
+                            s.norm == RealNvpSettings::Norm::batch ? realnvp::batch_norm_pass(flow) : nullptr);
     for (const double loss : run.at("loss"))
       EXPECT_NEAR(optimiser.step(batch, run.at("rate")), loss, 2e-5 * (1 + std::abs(loss)));
     for (const auto& [name, values] : run.at("after").items())
-      for (const realnvp::ParameterView& view : views) {
+      for (const ParameterView& view : views) {
         if (view.name != name) continue;
         for (std::size_t r = 0; r < view.rows; ++r)
           EXPECT_NEAR(static_cast<double>(optimiser.parameters()[view.offset + r]), values.at(r).get<double>(), 1e-4)

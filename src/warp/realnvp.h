@@ -29,7 +29,7 @@ class RealNvp final : public Warp {
  private:
   realnvp::Flow m_flow;
   nn::AlignedVector<float> m_parameters;
-  realnvp::Packed m_packed;
+  PackedParameters m_packed;
 };
 
 }  // namespace warpath

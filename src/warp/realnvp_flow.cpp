@@ -1,8 +1,6 @@
 #include "warp/realnvp_flow.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <utility>
 
 #include "core/rng.h"
@@ -27,23 +25,6 @@ nn::Norm norm_of(RealNvpSettings::Norm norm) {
   throw InternalError("unknown normalisation");
 }
 
-/// Which side of split number `pair` a dimension is on; both couplings of a pair use one split, from either side.
-/// Alternating masks tell even from odd dimensions [DSB17]. Binary ones ask for the parity of some bits of the
-/// dimension's number: first of each bit alone, so that any two dimensions part within log2(dims) splits [GIK20], then
-/// of ever more bits together.
-auto mask(int dims, RealNvpSettings::Masks masks, int pair) {
-  unsigned bits = 1;
-  if (masks == RealNvpSettings::Masks::binary && dims > 2) {
-    const unsigned all = std::bit_ceil(static_cast<unsigned>(dims)) - 1;
-    std::vector<unsigned> order;
-    for (unsigned m = 1; m <= all; ++m) order.push_back(m);
-    std::stable_sort(order.begin(), order.end(),
-                     [](unsigned a, unsigned b) { return std::popcount(a) < std::popcount(b); });
-    bits = order[static_cast<std::size_t>(pair) % order.size()];
-  }
-  return [bits](int i) { return std::popcount(static_cast<unsigned>(i) & bits) % 2 == 1; };
-}
-
 const float* row(const float* rows, std::size_t r) { return rows + r * kBlock; }
 float* row(float* rows, std::size_t r) { return rows + r * kBlock; }
 float* row(float* rows, int r) { return rows + static_cast<std::size_t>(r) * kBlock; }
@@ -51,34 +32,18 @@ const float* row(const float* rows, int r) { return rows + static_cast<std::size
 
 }  // namespace
 
-double block_loss(const Objective& objective, const double* log_q, const float* weight, const float* target,
-                  float* d_log_q) {
-  double loss = 0;
-  for (std::size_t i = 0; i < kBlock; ++i) {
-    d_log_q[i] = weight[i];
-    if (weight[i] == 0) continue;
-    const double w = static_cast<double>(weight[i]);
-    if (objective.loss == RealNvpSettings::Loss::likelihood) {
-      loss -= w * log_q[i];
-      continue;
-    }
-    const double q = (1 - objective.uniform) * std::exp(std::min(log_q[i], 700.0)), mixed = q + objective.uniform;
-    const double term = std::min(static_cast<double>(target[i]) / mixed, kMostWeight * objective.scale);
-    loss += w * term;
-    d_log_q[i] *= static_cast<float>(term / objective.scale * (q / mixed));
-  }
-  return loss;
-}
-
 Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings(settings) {
   if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
   if (settings.bins < 0) throw ConfigError(fmt::format("bins {}: must not be negative", settings.bins));
   WARPATH_CHECK(dims >= 1);
   for (int c = 0; c < settings.couplings; ++c) {
     Coupling coupling;
-    // A single dimension has nothing to be conditioned on: its networks have no inputs.
-    const auto split = mask(dims, settings.masks, c / 2);
-    for (int i = 0; i < dims; ++i) (dims > 1 && split(i) == (c % 2 == 1) ? coupling.kept : coupling.moved).push_back(i);
+    // A single dimension has nothing to be conditioned on: its networks have no inputs. Alternating masks tell even
+    // from odd dimensions [DSB17], as the binary ones of two dimensions do.
+    const bool binary = settings.masks == RealNvpSettings::Masks::binary;
+    const std::vector<bool> moves = binary_mask(binary || dims == 1 ? dims : 2, binary ? c : c % 2);
+    for (int i = 0; i < dims; ++i)
+      (moves[static_cast<std::size_t>(i) % moves.size()] ? coupling.moved : coupling.kept).push_back(i);
     const int kept = static_cast<int>(coupling.kept.size()), moved = static_cast<int>(coupling.moved.size());
     for (int n = 0; n < (settings.shared ? 1 : 2); ++n) {
       nn::ResidualNet net(kept * encoded_rows(settings.bins), settings.width, settings.blocks,
@@ -94,6 +59,10 @@ Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings
     m_most_moved = std::max(m_most_moved, coupling.moved.size());
     m_couplings.push_back(std::move(coupling));
   }
+}
+
+std::size_t Flow::first_parameter(std::size_t c) const {
+  return c < m_couplings.size() ? m_couplings[c].parameters.front() : m_parameters;
 }
 
 std::vector<ParameterView> Flow::views() const {
@@ -147,13 +116,13 @@ nn::AlignedVector<float> Flow::initial(std::uint64_t seed) const {
   return parameters;
 }
 
-void Flow::resize(Packed& packed, bool back) const {
+void Flow::resize(PackedParameters& packed, bool back) const {
   packed.forward.resize(m_packed);
   packed.back.resize(back ? m_packed_back : 0);
   packed.scales.resize(m_parameters == 0 ? 0 : m_couplings.size() * m_most_moved);
 }
 
-void Flow::pack_coupling(std::size_t c, const float* parameters, Packed& packed) const {
+void Flow::pack_coupling(std::size_t c, const float* parameters, PackedParameters& packed) const {
   const Coupling& coupling = m_couplings[c];
   for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
     const float* at = parameters + coupling.parameters[n];
@@ -163,9 +132,10 @@ void Flow::pack_coupling(std::size_t c, const float* parameters, Packed& packed)
   std::copy_n(parameters + coupling.scales, coupling.moved.size(), packed.scales.data() + c * m_most_moved);
 }
 
-void Flow::pack(const float* parameters, Packed& packed, bool back) const {
-  resize(packed, back);
-  for (std::size_t c = 0; c < m_couplings.size(); ++c) pack_coupling(c, parameters, packed);
+void Flow::unfold(std::size_t c, const float* parameters, float* gradients) const {
+  const Coupling& coupling = m_couplings[c];
+  for (std::size_t n = 0; n < coupling.nets.size(); ++n)
+    coupling.nets[n].unfold(parameters + coupling.parameters[n], gradients + coupling.parameters[n]);
 }
 
 // Inference: v at the start, v now, inputs, heads, and what ResidualNet::infer needs.
@@ -185,7 +155,7 @@ void Flow::encode_kept_backward(const Coupling& coupling, const float* v, const 
                     row(d_x, static_cast<int>(k) * encoded_rows(m_settings.bins)), row(d_v, coupling.kept[k]));
 }
 
-void Flow::condition(const Coupling& coupling, const Packed& packed, const float* v, float* x, float* scratch,
+void Flow::condition(const Coupling& coupling, const PackedParameters& packed, const float* v, float* x, float* scratch,
                      float* heads) const {
   encode_kept(coupling, v, x);
   for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
@@ -194,7 +164,7 @@ void Flow::condition(const Coupling& coupling, const Packed& packed, const float
   }
 }
 
-void Flow::forward(const Packed& packed, const double* z, double* y, double* log_det, float* scratch) const {
+void Flow::forward(const PackedParameters& packed, const double* z, double* y, double* log_det, float* scratch) const {
   float* start = scratch;
   float* v = row(start, m_dims);
   float* x = row(v, m_dims);
@@ -213,7 +183,7 @@ void Flow::forward(const Packed& packed, const double* z, double* y, double* log
   for (int i = 0; i < m_dims; ++i) shift_logit(z + i * kBlock, row(start, i), row(v, i), y + i * kBlock, log_det);
 }
 
-void Flow::inverse(const Packed& packed, const double* y, double* z, double* log_det, float* scratch) const {
+void Flow::inverse(const PackedParameters& packed, const double* y, double* z, double* log_det, float* scratch) const {
   float* start = scratch;
   float* v = row(start, m_dims);
   float* x = row(v, m_dims);
@@ -241,7 +211,7 @@ std::size_t Flow::training_scratch_count() const {
          ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
 }
 
-double Flow::train_block(const Packed& packed, const double* y, const float* weight, const float* target,
+double Flow::train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
                          const Objective& objective, float* gradients, bool accumulate, float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
   const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));

@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(Flows, FlowTest, testing::ValuesIn(cases()),
                          [](const auto& p) { return p.param.target + "_" + std::to_string(p.param.dims) + "D"; });
 
 TEST_P(FlowTest, DensityAgreesWithTheReference) {
-  Packed packed;
+  PackedParameters packed;
   m_flow.pack(m_parameters.data(), packed, false);
   Doubles z(m_y.size()), log_q(kBlock);
   Floats scratch(m_flow.scratch_count());
@@ -105,7 +105,7 @@ TEST_P(FlowTest, DensityAgreesWithTheReference) {
 }
 
 TEST_P(FlowTest, ForwardUndoesInverse) {
-  Packed packed;
+  PackedParameters packed;
   m_flow.pack(m_parameters.data(), packed, false);
   Doubles z(m_y.size()), y(m_y.size()), there(kBlock), back(kBlock);
   Floats scratch(m_flow.scratch_count());
@@ -129,7 +129,7 @@ TEST_P(FlowTest, ForwardUndoesInverse) {
 // Central differences of the reference's loss in double; those that cross a kink of a ReLU are told by two step sizes
 // that do not agree, and must stay rare.
 TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
-  Packed packed;
+  PackedParameters packed;
   m_flow.pack(m_parameters.data(), packed, true);
   Floats weight(kBlock), gradients(m_parameters.size() + 16, 0.0f), scratch(m_flow.training_scratch_count());
   for (std::size_t s = 0; s < kBlock; ++s)

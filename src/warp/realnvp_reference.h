@@ -2,7 +2,7 @@
 #include <cmath>
 #include <vector>
 
-#include "nn/dense.h"
+#include "warp/net_reference.h"
 #include "warp/realnvp_flow.h"
 #include "warp/realnvp_kernels.h"
 
@@ -31,7 +31,7 @@ class Reference {
         }
       }
       for (std::size_t n = 0; n < coupling.nets.size(); ++n)
-        for (const double h : net(coupling.nets[n], coupling.parameters[n], inputs)) heads.push_back(h);
+        for (const double h : reference_net(coupling.nets[n], p, coupling.parameters[n], inputs)) heads.push_back(h);
       const std::size_t moved = coupling.moved.size();
       for (std::size_t k = 0; k < moved; ++k) {
         double& x = v[static_cast<std::size_t>(coupling.moved[k])];
@@ -51,32 +51,6 @@ class Reference {
 
  private:
   static double log_logistic(double v) { return -std::abs(v) - 2 * std::log1p(std::exp(-std::abs(v))); }
-
-  std::vector<double> layer(const nn::DenseLayer& l, std::size_t at, const std::vector<double>& x) const {
-    std::vector<double> y(static_cast<std::size_t>(l.outputs));
-    for (std::size_t o = 0; o < y.size(); ++o) {
-      double sum = 0;
-      for (std::size_t k = 0; k < x.size(); ++k)
-        sum += p[at + l.weight + o * static_cast<std::size_t>(nn::padded_inputs(l.inputs)) + k] * x[k];
-      y[o] = (l.normalised ? p[at + l.gain + o] : 1.0) * sum + p[at + l.bias + o];
-    }
-    return y;
-  }
-
-  std::vector<double> net(const nn::ResidualNet& net, std::size_t at, const std::vector<double>& x) const {
-    const auto relu = [](std::vector<double> v) {
-      for (double& e : v) e = std::max(e, 0.0);
-      return v;
-    };
-    const auto& l = net.layers();
-    std::vector<double> h = relu(layer(l[0], at, x));
-    for (std::size_t i = 1; i + 2 < l.size(); i += 2) {
-      std::vector<double> sum = layer(l[i + 1], at, relu(layer(l[i], at, h)));
-      for (std::size_t j = 0; j < h.size(); ++j) sum[j] += h[j];
-      h = relu(sum);
-    }
-    return layer(l.back(), at, h);
-  }
 
   const Flow& m_flow;
   std::vector<double> p;

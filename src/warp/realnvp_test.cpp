@@ -30,7 +30,7 @@ std::shared_ptr<const RealNvp> bent(int dims, const RealNvpSettings& settings) {
   auto p = flow.initial(3);
   std::uint32_t n = 0;
   const float size = dims > 8 ? 0.1f : 0.3f;
-  for (const realnvp::ParameterView& view : flow.views())
+  for (const ParameterView& view : flow.views())
     for (std::size_t r = 0; r < view.rows; ++r)
       for (std::size_t c = 0; c < view.cols; ++c)
         p[view.offset + r * view.stride + c] += size * (2 * sample_float(5, n++) - 1) * (view.cols > 1 ? 0.5f : 1.0f);

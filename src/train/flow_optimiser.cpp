@@ -1,13 +1,11 @@
-#include "train/fit_realnvp_optimiser.h"
+#include "train/flow_optimiser.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
-#include "train/fit_realnvp_batch_norm.h"
-
-namespace warpath::realnvp {
+namespace warpath {
 namespace {
 
 using nn::kBlock;
@@ -17,7 +15,7 @@ using nn::kBlock;
 constexpr std::size_t kSlots = 8;
 
 /// E[g / q] starts near E[g], because q is 1 at the start.
-Objective initial_objective(const RealNvpSettings& settings, const ExampleBlocks& batch) {
+Objective initial_objective(const FlowTraining& settings, const ExampleBlocks& batch) {
   double scale = 0;
   for (std::size_t i = 0; i < batch.examples; ++i)
     scale += static_cast<double>(batch.weight[i]) * static_cast<double>(batch.target[i]);
@@ -42,36 +40,36 @@ void ExampleBlocks::set(std::size_t i, std::span<const float> example, float w, 
   target[i] = g;
 }
 
-Optimiser::Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average)
+FlowOptimiser::FlowOptimiser(const CouplingFlow& flow, nn::AlignedVector<float> parameters,
+                             const FlowTraining& settings, Pass pass)
     : m_flow(flow),
-      m_decay(average),
+      m_settings(settings),
+      m_pass(std::move(pass)),
       m_parameters(std::move(parameters)),
       m_average(m_parameters),
       m_gradients(kSlots * m_parameters.size(), 0.0f),
       m_m(m_parameters.size(), 0.0f),
       m_v(m_m),
       m_scratch(kSlots) {
-  if (flow.settings().norm == RealNvpSettings::Norm::batch) return;  // it has numbers of its own for each step
+  if (m_pass) return;  // it has numbers of its own for each step
   for (auto& scratch : m_scratch) scratch.resize(flow.training_scratch_count());
   m_flow.pack(m_parameters.data(), m_packed, true);
 }
 
-double Optimiser::step(const ExampleBlocks& batch, double rate) {
+double FlowOptimiser::step(const ExampleBlocks& batch, double rate) {
   const std::size_t slots = std::min(kSlots, batch.count);
-  if (m_step == 0) m_objective = initial_objective(m_flow.settings(), batch);
-  const bool fused = m_flow.settings().norm != RealNvpSettings::Norm::batch;
-  const double loss = fused
-                          ? fused_pass(batch, slots)
-                          : batch_norm_step(m_flow, batch, m_objective, m_parameters.data(), m_gradients.data(), slots);
+  if (m_step == 0) m_objective = initial_objective(m_settings, batch);
+  const double loss =
+      m_pass ? m_pass(batch, m_objective, m_parameters.data(), m_gradients.data(), slots) : fused_pass(batch, slots);
   ++m_step;
   const nn::Adam adam{.rate = static_cast<float>(rate)};
-  parallel(m_flow.couplings().size(), [&](std::size_t c) { update(c, slots, adam); });
-  if (m_objective.loss == RealNvpSettings::Loss::likelihood) return loss;
+  parallel(m_flow.coupling_count(), [&](std::size_t c) { update(c, slots, adam); });
+  if (m_objective.loss == FlowTraining::Loss::likelihood) return loss;
   m_objective.scale += 0.05 * (loss - m_objective.scale);
   return std::log(loss);
 }
 
-double Optimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
+double FlowOptimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
   std::array<double, kSlots> loss{};
   parallel(slots, [&](std::size_t slot) {
     const std::size_t first = slot * batch.count / slots, end = (slot + 1) * batch.count / slots;
@@ -84,21 +82,16 @@ double Optimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) {
 }
 
 // One coupling's share of everything that follows the gradient, while its numbers are in the cache.
-void Optimiser::update(std::size_t c, std::size_t slots, const nn::Adam& adam) {
-  const auto& couplings = m_flow.couplings();
-  const std::size_t from = couplings[c].parameters.front();
-  const std::size_t end = c + 1 < couplings.size() ? couplings[c + 1].parameters.front() : m_parameters.size();
-  const std::size_t count = end - from;
+void FlowOptimiser::update(std::size_t c, std::size_t slots, const nn::Adam& adam) {
+  const std::size_t from = m_flow.first_parameter(c), count = m_flow.first_parameter(c + 1) - from;
   nn::add_slots(static_cast<int>(slots), m_parameters.size(), count, m_gradients.data() + from);
-  for (std::size_t n = 0; n < couplings[c].nets.size(); ++n)
-    couplings[c].nets[n].unfold(m_parameters.data() + couplings[c].parameters[n],
-                                m_gradients.data() + couplings[c].parameters[n]);
+  m_flow.unfold(c, m_parameters.data(), m_gradients.data());
   nn::adam_step(adam, m_step, count, m_gradients.data() + from, m_parameters.data() + from, m_m.data() + from,
                 m_v.data() + from);
   // Young averages forget faster, so that the start has no part in them.
-  const double decay = std::min(m_decay, m_step / (m_step + 10.0));
+  const double decay = std::min(m_settings.average, m_step / (m_step + 10.0));
   nn::move_average(static_cast<float>(1 - decay), count, m_parameters.data() + from, m_average.data() + from);
-  if (!m_packed.forward.empty()) m_flow.pack_coupling(c, m_parameters.data(), m_packed);
+  if (!m_pass) m_flow.pack_coupling(c, m_parameters.data(), m_packed);
 }
 
-}  // namespace warpath::realnvp
+}  // namespace warpath

@@ -2,14 +2,15 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "core/floating_point.h"
 #include "nn/adam.h"
-#include "warp/realnvp_flow.h"
+#include "warp/coupling_flow.h"
 
-namespace warpath::realnvp {
+namespace warpath {
 
 /// Weighted examples as blocks of dims x nn::kBlock doubles; what is left of the last block weighs nothing.
 struct ExampleBlocks {
@@ -36,12 +37,18 @@ void parallel(std::size_t count, const auto& body) {
 }
 
 /// Parameters of a flow on their way down the gradient. All sums have a fixed order: threads change no bit.
-class Optimiser {
+class FlowOptimiser {
  public:
-  /// `average`: decay per step of the moving average of the parameters.
-  Optimiser(const Flow& flow, nn::AlignedVector<float> parameters, double average);
+  /// The loss over a whole batch and its gradients of the packed weights, in `slots` arrays, parameter_count() apart,
+  /// that sum up to them; may move parameters that no gradient reaches.
+  using Pass = std::function<double(const ExampleBlocks& batch, const Objective& objective, float* parameters,
+                                    float* gradients, std::size_t slots)>;
 
-  /// One step of Adam on the loss that the flow's settings name; weights must sum up to 1. Returns the loss before it,
+  /// Without `pass`, CouplingFlow::train_block makes the gradients, a block at a time.
+  FlowOptimiser(const CouplingFlow& flow, nn::AlignedVector<float> parameters, const FlowTraining& settings,
+                Pass pass = {});
+
+  /// One step of Adam on the loss that the settings name; weights must sum up to 1. Returns the loss before it,
   /// ln E[g / q] for Loss::variance.
   double step(const ExampleBlocks& batch, double rate);
 
@@ -50,17 +57,18 @@ class Optimiser {
   int steps() const { return m_step; }
 
  private:
-  /// Gradients by Flow::train_block, each slot's blocks in turn; returns the loss.
+  /// Gradients by train_block, each slot's blocks in turn; returns the loss.
   double fused_pass(const ExampleBlocks& batch, std::size_t slots);
   void update(std::size_t coupling, std::size_t slots, const nn::Adam& adam);
 
-  const Flow& m_flow;
-  double m_decay;
+  const CouplingFlow& m_flow;
+  FlowTraining m_settings;
+  Pass m_pass;
   int m_step = 0;
   Objective m_objective;
   nn::AlignedVector<float> m_parameters, m_average, m_gradients, m_m, m_v;
-  Packed m_packed;
+  PackedParameters m_packed;
   std::vector<nn::AlignedVector<float>> m_scratch;  ///< one for each slot
 };
 
-}  // namespace warpath::realnvp
+}  // namespace warpath

@@ -1,0 +1,48 @@
+#pragma once
+#include <chrono>
+#include <cstdint>
+
+#include "train/flow_optimiser.h"
+#include "train/training_data.h"
+
+namespace warpath {
+
+/// Trains a flow on examples in minibatches until the loss over the examples held out (the last rows) no longer falls.
+/// The same bits for any number of threads.
+class FlowTrainer {
+ public:
+  /// Throws ConfigError for settings or examples that nothing can be learned with.
+  FlowTrainer(const CouplingFlow& flow, const Examples& examples, const FlowTraining& settings, std::uint64_t seed);
+
+  const ExampleBlocks& first_batch() const { return m_batch; }
+
+  struct Result {
+    nn::AlignedVector<float> parameters;  ///< those that were best on the examples held out
+    TrainLog log;
+  };
+  /// From `start` on; once only. Ends with the best so far when g_interrupted is set; throws Interrupted if there is
+  /// none yet.
+  Result run(nn::AlignedVector<float> start, FlowOptimiser::Pass pass = {});
+
+ private:
+  void next_batch();
+  std::uint32_t next_example();
+  float weight(std::size_t i) const { return m_examples.weight.empty() ? 1.0f : m_examples.weight[i]; }
+  /// g, up to a factor that is the same for all: weight times the density that the example was drawn from.
+  float target(std::size_t i) const { return m_examples.inv_q.empty() ? weight(i) : weight(i) / m_examples.inv_q[i]; }
+  double held_out_loss(const nn::AlignedVector<float>& parameters) const;
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - m_start).count(); }
+
+  const CouplingFlow& m_flow;
+  const Examples& m_examples;
+  FlowTraining m_settings;
+  std::chrono::steady_clock::time_point m_start = std::chrono::steady_clock::now();
+  ExampleBlocks m_batch, m_held_out;
+  double m_mean_weight = 0, m_held_out_weight = 0;
+  // Examples to train on, in an order of its own for every epoch.
+  std::vector<std::uint32_t> m_order;
+  std::uint64_t m_order_seed, m_epoch = 0;
+  std::size_t m_next = 0;
+};
+
+}  // namespace warpath
