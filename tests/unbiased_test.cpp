@@ -35,6 +35,9 @@ TrainSettings short_training() {
   settings.realnvp.couplings = 4;
   settings.realnvp.width = 32;
   settings.realnvp.max_steps = 120;
+  settings.spline.couplings = 2;
+  settings.spline.width = 16;
+  settings.spline.max_steps = 120;
   return settings;
 }
 
@@ -130,6 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Families, Unbiased,
                                          Case{"realnvp", "film+bounce1"}, Case{"realnvp", "film+bounce1.lobe+bounce1"},
                                          Case{"realnvp", "film+bounce1+bounce2+bounce3"},
                                          Case{"realnvp", "bounce1+bounce2.light_uv"}, Case{"realnvp", "film"},
+                                         Case{"spline", "film+bounce1"}, Case{"spline", "bounce1.lobe+bounce1"},
                                          Case{"grid", "film+bounce1.light_uv+bounce1+bounce2+bounce3+bounce4"}),
                          [](const auto& info) {
                            std::string name = info.param.family + "_" + info.param.dims;
@@ -167,7 +171,8 @@ std::vector<Color> image_bits(const std::string& family, const std::string& dims
 }
 
 TEST(Deterministic, SameSeedSameBitsForAnyNumberOfThreads) {
-  for (const auto& [family, dims] : {std::pair{"none", ""}, {"kdtree", "film+bounce1"}, {"realnvp", "film+bounce1"}}) {
+  for (const auto& [family, dims] :
+       {std::pair{"none", ""}, {"kdtree", "film+bounce1"}, {"realnvp", "film+bounce1"}, {"spline", "film+bounce1"}}) {
     const auto one = image_bits(family, dims, 1), two = image_bits(family, dims, 2),
                again = image_bits(family, dims, 2);
     ASSERT_EQ(one.size(), two.size());

@@ -41,6 +41,37 @@ void add_options(CLI::App& app, TrainingOptions& options) {
       "Whether candidates count in the image: discard (as the paper does) or use")
       ->check(CLI::IsMember({"discard", "use"}));
 
+  constexpr auto kFlow = "Real NVP and spline";
+  const auto add_flow = [&](const char* name, auto& value, const char* help) {
+    return app.add_option(name, value, help)->group(kFlow);
+  };
+  const RealNvpSettings& nvp = options.settings.realnvp;
+  const SplineSettings& spline = options.settings.spline;
+  const auto defaults = [](const char* help, auto of_nvp, auto of_spline) {
+    return fmt::format("{} [{}; spline: {}]", help, of_nvp, of_spline);
+  };
+  const auto add_sized = [&](const char* name, auto& value, const char* help, auto of_nvp, auto of_spline) {
+    return add_flow(name, value, defaults(help, of_nvp, of_spline).c_str());
+  };
+  add_sized("--couplings", options.couplings, "Coupling layers", nvp.couplings, spline.couplings)
+      ->check(CLI::Range(1, 64));
+  add_sized("--width", options.width, "Neurons in each hidden layer", nvp.width, spline.width)
+      ->check(CLI::Range(1, 1024));
+  add_sized("--blocks", options.blocks, "Residual blocks in each network", nvp.blocks, spline.blocks)
+      ->check(CLI::Range(0, 64));
+  add_sized("--encoding-bins", options.encoding_bins, "Bins of the one-blob encoding of what the networks see; 0: none",
+            nvp.bins, spline.encoding_bins)
+      ->check(CLI::Range(0, 256));
+  add_sized("--rate", options.rate, "Step size of Adam", nvp.rate, spline.rate)->check(CLI::PositiveNumber);
+  add_sized("--batch", options.batch, "Examples in a training step", nvp.batch, spline.batch)
+      ->check(CLI::Range(64, 1 << 20));
+  add_sized("--max-steps", options.max_steps, "Training steps at most", nvp.max_steps, spline.max_steps)
+      ->check(CLI::NonNegativeNumber);
+  add_flow("--loss", options.loss,
+           "What training minimises: variance of the estimate, or likelihood, as the paper does")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"variance", "likelihood"}));
+
   constexpr auto kNvp = "Real NVP";
   const auto add_nvp = [&](const char* name, auto& value, const char* help) {
     return app.add_option(name, value, help)->group(kNvp)->capture_default_str();
@@ -48,25 +79,14 @@ void add_options(CLI::App& app, TrainingOptions& options) {
   add_nvp("--architecture", options.architecture,
           "default, or released: the authors' 12 couplings of 512 x 8, with their rate")
       ->check(CLI::IsMember({"default", "released"}));
-  add_nvp("--couplings", options.settings.realnvp.couplings, "Coupling layers")->check(CLI::Range(1, 64));
-  add_nvp("--width", options.settings.realnvp.width, "Neurons in each hidden layer")->check(CLI::Range(1, 1024));
-  add_nvp("--blocks", options.settings.realnvp.blocks, "Residual blocks in each network")->check(CLI::Range(0, 64));
-  add_nvp("--encoding-bins", options.settings.realnvp.bins,
-          "Bins of the one-blob encoding of what the networks see; 0: none")
-      ->check(CLI::Range(0, 256));
   add_nvp("--masks", options.masks, "What a coupling moves: alternating dimensions, or binary, halves that change")
       ->check(CLI::IsMember({"alternating", "binary"}));
-  add_nvp("--loss", options.loss, "What training minimises: variance of the estimate, or likelihood, as the paper does")
-      ->check(CLI::IsMember({"variance", "likelihood"}));
   add_nvp("--networks", options.networks, "shared: s and t from one network; separate, as the paper has them")
       ->check(CLI::IsMember({"shared", "separate"}));
   add_nvp("--bn", options.bn, "Normalisation: none, actnorm, or batch (as the paper has it)")
       ->check(CLI::IsMember({"none", "actnorm", "batch"}));
-  add_nvp("--rate", options.settings.realnvp.rate, "Step size of Adam")->check(CLI::PositiveNumber);
-  add_nvp("--batch", options.settings.realnvp.batch, "Examples in a training step")->check(CLI::Range(64, 1 << 20));
-  add_nvp("--max-steps", options.settings.realnvp.max_steps, "Training steps at most")->check(CLI::NonNegativeNumber);
 
-  constexpr auto kTree = "kd-tree and grid";
+  constexpr auto kTree = "kd-tree, grid and spline";
   app.add_option("--kdtree-target", options.kdtree_target,
                  "A cell's density follows: mean g, or rms, the root of its mean square")
       ->group(kTree)
@@ -81,9 +101,10 @@ void add_options(CLI::App& app, TrainingOptions& options) {
       ->group(kTree)
       ->capture_default_str()
       ->check(CLI::Range(1, 1 << 24));
-  app.add_option("--bins", options.settings.grid.bins, "Intervals of the grid in each dimension")
+  app.add_option("--bins", options.bins,
+                 fmt::format("Intervals of the grid in each dimension [{}]; bins of each spline, 2 to 64 [{}]",
+                             options.settings.grid.bins, options.settings.spline.bins))
       ->group(kTree)
-      ->capture_default_str()
       ->check(CLI::Range(1, 1 << 16));
 }
 
@@ -108,7 +129,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
   sub->add_option("-o,--output", command.output, "Image to write: .exr (with variance), .png, .jpg")
       ->capture_default_str();
   sub->add_option("--warp", command.warp,
-                  "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, field")
+                  "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");
@@ -120,7 +141,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
 CLI::App* add_command(CLI::App& app, TrainCommand& command) {
   CLI::App* sub = app.add_subcommand("train", "Train a warp and save it");
   sub->add_option("scene", command.common.scene, "Mitsuba 3 scene file")->required();
-  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree or realnvp")->required();
+  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline")->required();
   sub->add_option("-o,--output", command.output, "File to write (safetensors)")->required();
   add_options(*sub, command.common);
   add_options(*sub, command.training);

@@ -13,7 +13,7 @@
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 6> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp", "field"};
+constexpr std::array<std::string_view, 7> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp", "spline", "field"};
 constexpr std::string_view kDefaultDimensions = "film+bounce1";
 
 /// Candidates are drawn from other numbers than the image, whatever its seed.

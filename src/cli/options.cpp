@@ -51,16 +51,41 @@ SceneOptions CommonOptions::scene_options() const {
   return options;
 }
 
+namespace {
+
+template <class T>
+void give(const std::optional<T>& option, T& setting) {
+  if (option) setting = *option;
+}
+
+}  // namespace
+
 TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   TrainSettings result = settings;
   result.seed = seed;
   result.examples = examples ? examples : static_cast<std::uint64_t>(std::llround(epp * 200 * 160));
-  if (architecture == "released") {
+  const bool released = architecture == "released";
+  if (released) {
     result.realnvp = released_realnvp();
-    result.realnvp.batch = settings.realnvp.batch;
-    result.realnvp.max_steps = settings.realnvp.max_steps;
+  } else {
+    give(couplings, result.realnvp.couplings);
+    give(width, result.realnvp.width);
+    give(blocks, result.realnvp.blocks);
+    give(encoding_bins, result.realnvp.bins);
+    give(rate, result.realnvp.rate);
   }
-  if (loss == "likelihood") result.realnvp.loss = RealNvpSettings::Loss::likelihood;
+  give(couplings, result.spline.couplings);
+  give(width, result.spline.width);
+  give(blocks, result.spline.blocks);
+  give(encoding_bins, result.spline.encoding_bins);
+  give(rate, result.spline.rate);
+  give(bins, result.spline.bins);
+  give(bins, result.grid.bins);
+  for (FlowTraining* flow : {static_cast<FlowTraining*>(&result.realnvp), static_cast<FlowTraining*>(&result.spline)}) {
+    give(batch, flow->batch);
+    give(max_steps, flow->max_steps);
+    if (loss == "likelihood") flow->loss = FlowTraining::Loss::likelihood;
+  }
   if (networks == "separate") result.realnvp.shared = false;
   if (masks == "alternating") result.realnvp.masks = RealNvpSettings::Masks::alternating;
   if (bn == "none") result.realnvp.norm = RealNvpSettings::Norm::none;

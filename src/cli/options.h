@@ -37,6 +37,9 @@ struct TrainingOptions {
   std::string bn = "actnorm", masks = "binary", architecture = "default";
   std::string loss = "variance", networks = "shared";
   std::string kdtree_target = "rms", kdtree_split = "best";
+  // Of both flows, and of spline and grid; what is not given is the family's own default.
+  std::optional<int> couplings, width, blocks, encoding_bins, batch, max_steps, bins;
+  std::optional<double> rate;
 
   TrainSettings train_settings(std::uint64_t seed) const;
   bool use_samples() const { return training_samples == "use"; }

@@ -15,7 +15,7 @@ void run(const TrainCommand& command) {
   const Method method = parse_method(command.warp);
   if (method.family == "none" || method.family == "uniform" || !method.file.empty())
     throw ConfigError(fmt::format(
-        "--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree or realnvp", command.warp));
+        "--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp or spline", command.warp));
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
   const TrainSettings settings = command.training.train_settings(common.seed);
   MethodTrainer trainer(tracer, settings, command.training.init, false, std::nullopt, common.quiet);

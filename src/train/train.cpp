@@ -8,6 +8,7 @@
 #include "train/fit_grid.h"
 #include "train/fit_kdtree.h"
 #include "train/fit_realnvp.h"
+#include "train/fit_spline.h"
 #include "train/resample.h"
 #include "warp/mixture.h"
 #include "warp/scratch.h"
@@ -19,6 +20,9 @@ namespace {
 
 constexpr std::uint64_t kHeldOut = 64;             // one candidate of so many judges a kd-tree or a grid
 constexpr std::size_t kMaxTreeBytes = 3ull << 30;  // rows that a kd-tree may be grown from, its working copy included
+
+// Rows that a spline flow learns from, drawn from the candidates it has anyway: with fewer it soon knows them by heart.
+constexpr std::uint64_t kSplineRows = std::uint64_t{1} << 22;
 
 /// The component that was learned: a mixture's first one that is not uniform.
 const Proposal* learned(const Proposal* proposal) {
@@ -88,7 +92,7 @@ std::uint64_t candidate_count(const TrainSettings& settings) {
 }
 
 Fit train(const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
-  constexpr std::string_view kFamilies[] = {"uniform", "grid", "kdtree", "realnvp"};
+  constexpr std::string_view kFamilies[] = {"uniform", "grid", "kdtree", "realnvp", "spline"};
   if (std::find(std::begin(kFamilies), std::end(kFamilies), settings.family) == std::end(kFamilies))
     throw ConfigError(
         fmt::format("unknown warp family \"{}\";{}", settings.family, suggestion(settings.family, kFamilies)));
@@ -104,13 +108,20 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
 
   init = learned(init);
   Fit fit;
-  if (settings.family == "realnvp") {
+  if (settings.family == "realnvp" || settings.family == "spline") {
     const auto start = std::chrono::steady_clock::now();
-    const Examples examples = resample(candidates, settings.examples, mix64(settings.seed + 1));
+    const bool spline = settings.family == "spline";
+    const std::uint64_t rows =
+        spline ? std::max(settings.examples, std::min<std::uint64_t>(candidates.size(), kSplineRows))
+               : settings.examples;
+    const Examples examples = resample(candidates, rows, mix64(settings.seed + 1));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    RealNvpSettings realnvp = settings.realnvp;
-    realnvp.uniform = settings.uniform;
-    fit = fit_realnvp(examples, realnvp, settings.seed, init);
+    const auto with_uniform = [&](auto flow) {
+      flow.uniform = settings.uniform;
+      return flow;
+    };
+    fit = spline ? fit_spline(examples, with_uniform(settings.spline), settings.seed, init)
+                 : fit_realnvp(examples, with_uniform(settings.realnvp), settings.seed, init);
     fit.log.seconds += seconds;
   } else {
     fit = fit_to_candidates(candidates, settings, init);

@@ -10,10 +10,11 @@ namespace warpath {
 std::uint64_t candidate_count(const TrainSettings& settings);
 
 /// Fits the family that the settings name, and mixes it with the uniform proposal (unless settings.uniform is 0). Real
-/// NVP learns from settings.examples resampled candidates, the others from all candidates, weighted. `init`: a proposal
-/// to start from, mixtures looked into; for realnvp and grid. Where no candidate has any light the uniform proposal
-/// comes back. Throws ConfigError for settings that make no sense, and Interrupted if nothing is learned yet when
-/// g_interrupted is set.
+/// NVP learns from settings.examples resampled candidates, a spline flow from as many as there are candidates (4 M at
+/// most, or settings.examples if that is more), the others from all candidates, weighted. `init`: a proposal to start
+/// from, mixtures looked into; for flows and the grid. Where no candidate has any light the uniform proposal comes back.
+/// Throws ConfigError for settings that make no sense, and Interrupted if nothing is learned yet when g_interrupted is
+/// set.
 Fit train(const Candidates& candidates, const TrainSettings& settings, const Proposal* init = nullptr);
 
 }  // namespace warpath

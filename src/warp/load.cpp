@@ -7,6 +7,7 @@
 #include "warp/kdtree.h"
 #include "warp/mixture.h"
 #include "warp/realnvp.h"
+#include "warp/spline.h"
 #include "warp/uniform.h"
 #include "warpath/error.h"
 
@@ -25,7 +26,7 @@ std::shared_ptr<const Proposal> load_as(const TensorFile& file, const std::strin
 
 constexpr std::array kFamilies{Family{"uniform", load_as<Uniform>}, Family{"grid", load_as<Grid>},
                                Family{"kdtree", load_as<KdTree>}, Family{"realnvp", load_as<RealNvp>},
-                               Family{"mixture", load_as<Mixture>}};
+                               Family{"spline", load_as<Spline>}, Family{"mixture", load_as<Mixture>}};
 
 }  // namespace
 
