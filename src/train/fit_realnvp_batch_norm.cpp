@@ -190,7 +190,7 @@ void BatchNormPass::backward(const float* parameters, const float* x, const floa
   }
 }
 
-double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objective& objective, float* parameters,
+double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const FlowObjective& objective, float* parameters,
                        float* gradients, std::size_t slots) {
   const std::size_t dims = batch.dims, blocks = batch.count, couplings = flow.couplings().size();
   const std::size_t state = dims * kBlock;
@@ -278,7 +278,7 @@ double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const Objec
 }
 
 FlowOptimiser::Pass batch_norm_pass(const Flow& flow) {
-  return [&flow](const ExampleBlocks& batch, const Objective& objective, float* parameters, float* gradients,
+  return [&flow](const ExampleBlocks& batch, const FlowObjective& objective, float* parameters, float* gradients,
                  std::size_t slots) { return batch_norm_step(flow, batch, objective, parameters, gradients, slots); };
 }
 

@@ -15,7 +15,7 @@ using nn::kBlock;
 constexpr std::size_t kSlots = 8;
 
 /// E[g / q] starts near E[g], because q is 1 at the start.
-Objective initial_objective(const FlowTraining& settings, const ExampleBlocks& batch) {
+FlowObjective initial_objective(const FlowTraining& settings, const ExampleBlocks& batch) {
   double scale = 0;
   for (std::size_t i = 0; i < batch.examples; ++i)
     scale += static_cast<double>(batch.weight[i]) * static_cast<double>(batch.target[i]);

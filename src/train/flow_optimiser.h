@@ -41,7 +41,7 @@ class FlowOptimiser {
  public:
   /// The loss over a whole batch and its gradients of the packed weights, in `slots` arrays, parameter_count() apart,
   /// that sum up to them; may move parameters that no gradient reaches.
-  using Pass = std::function<double(const ExampleBlocks& batch, const Objective& objective, float* parameters,
+  using Pass = std::function<double(const ExampleBlocks& batch, const FlowObjective& objective, float* parameters,
                                     float* gradients, std::size_t slots)>;
 
   /// Without `pass`, CouplingFlow::train_block makes the gradients, a block at a time.
@@ -65,7 +65,7 @@ class FlowOptimiser {
   FlowTraining m_settings;
   Pass m_pass;
   int m_step = 0;
-  Objective m_objective;
+  FlowObjective m_objective;
   nn::AlignedVector<float> m_parameters, m_average, m_gradients, m_m, m_v;
   PackedParameters m_packed;
   std::vector<nn::AlignedVector<float>> m_scratch;  ///< one for each slot

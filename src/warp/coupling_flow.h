@@ -58,7 +58,8 @@ class CouplingFlow {
   /// parameter_count(), layout as the parameters, of the weights as they are packed (see unfold), padding between
   /// tensors untouched; it is added to what is there if `accumulate`.
   virtual double train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                             const Objective& objective, float* gradients, bool accumulate, float* scratch) const = 0;
+                             const FlowObjective& objective, float* gradients, bool accumulate,
+                             float* scratch) const = 0;
   /// Turns one coupling's gradients of packed weights into those of the parameters, in place. Both arrays whole.
   virtual void unfold(std::size_t coupling, const float* parameters, float* gradients) const = 0;
 };

@@ -7,7 +7,7 @@
 
 namespace warpath {
 
-double block_loss(const Objective& objective, const double* log_q, const float* weight, const float* target,
+double block_loss(const FlowObjective& objective, const double* log_q, const float* weight, const float* target,
                   float* d_log_q) {
   double loss = 0;
   for (std::size_t i = 0; i < nn::kBlock; ++i) {

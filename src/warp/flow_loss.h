@@ -4,7 +4,7 @@
 namespace warpath {
 
 /// What a step of training minimises, see FlowTraining::Loss.
-struct Objective {
+struct FlowObjective {
   FlowTraining::Loss loss = FlowTraining::Loss::likelihood;
   double uniform = 0;  ///< variance only: q stands for (1 - uniform) q + uniform
   double scale = 1;    ///< variance only: about E[g / q]; the gradient is that of the loss over it
@@ -16,7 +16,7 @@ inline constexpr double kMostWeight = 10;
 
 /// The loss summed over one block: of weight[i] * -ln q_i, or of weight[i] * target[i] / q_i, each example's part of it
 /// cut off at kMostWeight * scale. d_log_q: its derivative with respect to -ln q_i (divided by scale).
-double block_loss(const Objective& objective, const double* log_q, const float* weight, const float* target,
+double block_loss(const FlowObjective& objective, const double* log_q, const float* weight, const float* target,
                   float* d_log_q);
 
 }  // namespace warpath

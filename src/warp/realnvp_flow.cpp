@@ -212,7 +212,7 @@ std::size_t Flow::training_scratch_count() const {
 }
 
 double Flow::train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                         const Objective& objective, float* gradients, bool accumulate, float* scratch) const {
+                         const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
   const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };

@@ -48,7 +48,7 @@ class Flow final : public CouplingFlow {
 
   std::size_t training_scratch_count() const override;
   double train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                     const Objective& objective, float* gradients, bool accumulate, float* scratch) const override;
+                     const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const override;
   void unfold(std::size_t coupling, const float* parameters, float* gradients) const override;
 
   /// What a coupling's networks see: v (dims x kBlock) -> x (inputs x kBlock).

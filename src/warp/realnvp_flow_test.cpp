@@ -135,8 +135,9 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
   for (std::size_t s = 0; s < kBlock; ++s)
     weight[s] = s < 50 ? 0.5f + sample_float(9, static_cast<std::uint32_t>(s)) : 0.0f;
   gradients.back() = 5;
-  const Objective objective{m_case.uniform > 0 ? RealNvpSettings::Loss::variance : RealNvpSettings::Loss::likelihood,
-                            m_case.uniform, m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
+  const FlowObjective objective{
+      m_case.uniform > 0 ? RealNvpSettings::Loss::variance : RealNvpSettings::Loss::likelihood, m_case.uniform,
+      m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
   Floats target(kBlock);
   for (std::size_t s = 0; s < kBlock; ++s) target[s] = 3 * sample_float(10, static_cast<std::uint32_t>(s));
   const double loss = m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(),

@@ -42,7 +42,7 @@ class Flow final : public CouplingFlow {
 
   std::size_t training_scratch_count() const override;
   double train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                     const Objective& objective, float* gradients, bool accumulate, float* scratch) const override;
+                     const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const override;
   void unfold(std::size_t, const float*, float*) const override {}  // weights are packed as they are
 
  private:

@@ -123,8 +123,8 @@ TEST_P(SplineFlowTest, GradientsAgreeWithFiniteDifferences) {
     target[s] = 3 * sample_float(10, static_cast<std::uint32_t>(s));
   }
   gradients.back() = 5;
-  const Objective objective{m_case.uniform > 0 ? Loss::variance : Loss::likelihood, m_case.uniform,
-                            m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
+  const FlowObjective objective{m_case.uniform > 0 ? Loss::variance : Loss::likelihood, m_case.uniform,
+                                m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
   const double loss = m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(),
                                          false, scratch.data());
   const Floats once(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(m_parameters.size()));
