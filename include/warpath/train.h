@@ -59,6 +59,17 @@ struct KdTreeSettings {
   double shrink = 16;    ///< a cell's mean is drawn to its parent's, the more the noisier the target; 0 believes it
 };
 
+/// Settings of the field, the warp that lives at every vertex and learns while it renders.
+struct FieldSettings {
+  /// Density of a bin ~ mean of what comes back, or its root mean square, which would be best if it were known well.
+  enum class Target { mean, second_moment } target = Target::mean;
+  std::uint32_t max_cells = 1 << 15;
+  double split_at = 700;  ///< vertices in a cell after which it is cut in two
+  double shrink = 32;     ///< a bin is drawn to those around it as if by so many samples of theirs
+  double uniform = 0.4;   ///< share of uniform numbers in every cell; more in cells of few vertices
+  double trust = 64;      ///< vertices in a cell that count as much as the uniform density
+};
+
 struct GridSettings {
   int bins = 128;  ///< intervals in each dimension
   int iterations = 10;
@@ -75,6 +86,7 @@ struct TrainSettings {
   SplineSettings spline;
   KdTreeSettings kdtree;
   GridSettings grid;
+  FieldSettings field;
 };
 
 /// How training went: one point per evaluation of the held-out likelihood.

@@ -9,11 +9,14 @@
 
 namespace warpath {
 
-/// A trained warp as a file: a proposal and what it was trained on.
+class VertexWarp;
+
+/// A trained warp as a file: a proposal or a warp of the numbers of vertices, and what it was trained on.
 struct WarpFile {
-  std::shared_ptr<const Proposal> proposal;
-  Layout layout;                                ///< the dimensions that it warps; as many as the proposal has
-  std::string scene;                            ///< name of the scene, for people
+  std::shared_ptr<const Proposal> proposal;       ///< null for a warp of vertices
+  std::shared_ptr<const VertexWarp> vertex_warp;  ///< null for a proposal
+  Layout layout;      ///< the dimensions that a proposal warps, as many as it has; empty for a warp of vertices
+  std::string scene;  ///< name of the scene, for people
   std::map<std::string, std::string> settings;  ///< of the training, by name
 };
 
@@ -21,5 +24,7 @@ struct WarpFile {
 void save_warp(const std::filesystem::path& path, const WarpFile& file);
 /// Throws FileError that names the file and what is wrong with it.
 WarpFile load_warp(const std::filesystem::path& path);
+/// `kdtree`, `mixture`, `field`, ...
+std::string family_of(const WarpFile& file);
 
 }  // namespace warpath

@@ -86,6 +86,11 @@ void add_options(CLI::App& app, TrainingOptions& options) {
   add_nvp("--bn", options.bn, "Normalisation: none, actnorm, or batch (as the paper has it)")
       ->check(CLI::IsMember({"none", "actnorm", "batch"}));
 
+  app.add_option("--cells", options.settings.field.max_cells, "Cells of the field at most; each takes about 5 KB")
+      ->group("Field")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1 << 24));
+
   constexpr auto kTree = "kd-tree, grid and spline";
   app.add_option("--kdtree-target", options.kdtree_target,
                  "A cell's density follows: mean g, or rms, the root of its mean square")
@@ -128,8 +133,9 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
   sub->add_option("scene", command.common.scene, "Mitsuba 3 scene file")->required();
   sub->add_option("-o,--output", command.output, "Image to write: .exr (with variance), .png, .jpg")
       ->capture_default_str();
-  sub->add_option("--warp", command.warp,
-                  "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field")
+  sub->add_option(
+         "--warp", command.warp,
+         "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");
@@ -141,7 +147,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
 CLI::App* add_command(CLI::App& app, TrainCommand& command) {
   CLI::App* sub = app.add_subcommand("train", "Train a warp and save it");
   sub->add_option("scene", command.common.scene, "Mitsuba 3 scene file")->required();
-  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline")->required();
+  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline; or field")->required();
   sub->add_option("-o,--output", command.output, "File to write (safetensors)")->required();
   add_options(*sub, command.common);
   add_options(*sub, command.training);

@@ -11,8 +11,12 @@ namespace {
 
 void inspect_warp(const std::filesystem::path& path) {
   const WarpFile warp = load_warp(path);
-  fmt::print("family      {}\ndimensions  {} ({})\nscene       {}\n", warp.proposal->family(), warp.layout.dims(),
-             warp.layout.name(), warp.scene);
+  fmt::print("family      {}\n", family_of(warp));
+  if (warp.proposal)
+    fmt::print("dimensions  {} ({})\n", warp.layout.dims(), warp.layout.name());
+  else
+    fmt::print("dimensions  light, light_uv, lobe and dir of every vertex\n");
+  fmt::print("scene       {}\n", warp.scene);
   for (const auto& [name, value] : warp.settings) fmt::print("{:<11} {}\n", name, value);
   fmt::print("tensors\n");
   const TensorFile tensors = TensorFile::load(path);

@@ -32,7 +32,7 @@ Method parse_method(const std::string& text) {
                                     suggestion(method.family, kFamilies)));
     method.file = text;
     const WarpFile file = load_warp(text);
-    method.family = file.proposal->family();
+    method.family = family_of(file);
     method.layout = file.layout;
     return method;
   }
@@ -80,12 +80,14 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
   PreparedMethod prepared;
   if (method.family == "none") return prepared;
   if (!method.layout.contains({GroupKind::film})) prepared.guide.objective = m_objective;
-  if (method.family == "field") {
-    prepared.guide.trainer = std::make_unique<FieldTrainer>(FieldSettings{}, m_tracer->emitters());
+  if (!method.file.empty()) {
+    const WarpFile file = load_warp(method.file);
+    prepared.proposal = file.proposal;
+    prepared.guide.warp = file.vertex_warp;
     return prepared;
   }
-  if (!method.file.empty()) {
-    prepared.proposal = load_warp(method.file).proposal;
+  if (method.family == "field") {
+    prepared.guide.trainer = std::make_unique<FieldTrainer>(m_settings.field, m_tracer->emitters());
     return prepared;
   }
   TrainSettings settings = m_settings;

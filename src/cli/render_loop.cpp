@@ -17,7 +17,7 @@ double seconds_since(Clock::time_point then) { return std::chrono::duration<doub
 void add_pass(ImageEstimator& estimator, int spp, bool last, Guide& guide, const Progress& progress,
               const std::function<bool()>& stop) {
   if (guide.empty()) return estimator.add_pass(spp, progress, stop);
-  const bool learns = guide.trainer && !last;
+  const bool learns = guide.trainer && (guide.keep || !last);
   const std::uint64_t before = estimator.cost().samples;
   estimator.add_guided_pass(spp, {guide.warp.get(), learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
                             stop);

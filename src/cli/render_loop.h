@@ -20,6 +20,7 @@ struct Guide {
   std::optional<Objective> objective{};      ///< where samples go; else every pixel has as many
   std::shared_ptr<const VertexWarp> warp{};  ///< draws the numbers of vertices; null: they are uniform
   std::unique_ptr<FieldTrainer> trainer{};   ///< learns the warp from each pass for the next; null: it stays
+  bool keep = false;                         ///< learns from the last pass, too: the warp is wanted, not the image
   double fit_seconds = 0;                    ///< spent between passes
   std::uint64_t taught = 0;                  ///< paths that the warp has learned from
   bool empty() const { return !objective && !warp && !trainer; }

@@ -105,7 +105,7 @@ void ImageEstimator::add_pass(int spp, const Progress& progress, const std::func
 
 void ImageEstimator::add_guided_pass(int spp, const Guidance& guidance, const Progress& progress,
                                      const std::function<bool()>& stop) {
-  WARPATH_CHECK(!m_proposal && !m_joint);
+  WARPATH_CHECK(!m_joint && !(m_proposal && guidance.warp));
   add_emission_pass(spp, stop);
   if (!m_moments) m_moments.emplace(m_film.width(), m_film.height());
   add_paths(spp, guidance, progress, stop);

@@ -48,7 +48,7 @@ class ImageEstimator {
   /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
-  /// The same with guidance; the proposal must be null. Every pass weighs by its samples per pixel, the same in every
+  /// The same with guidance, for a stratified film; with a warp of vertices the proposal must be null. Every pass weighs by its samples per pixel, the same in every
   /// pixel, so samples may be placed by what earlier ones found.
   void add_guided_pass(int spp, const Guidance& guidance, const Progress& progress = {},
                        const std::function<bool()>& stop = {});

@@ -33,9 +33,10 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   void record(const VertexRecords& records) override {
     const FieldGrids& grids = m_trainer.m_grids;
     const auto& u = records.numbers;
-    // f^2 / q of a term t = f / q.
-    const auto moment = [](float term, float inv_q) {
-      const float m = term * term / inv_q;
+    const bool squared = m_trainer.m_settings.target == FieldSettings::Target::second_moment;
+    // f / q, or f^2 / q, of a term f / q.
+    const auto moment = [squared](float term, float inv_q) {
+      const float m = squared ? term * term / inv_q : term;
       return std::isfinite(m) ? m : 0.0f;
     };
     for (std::size_t i = 0; i < records.lanes.size(); ++i) {
@@ -173,11 +174,11 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
 }
 
 void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws,
-                               std::span<float> left) const {
+                               HalfProbability* density) const {
   const std::uint32_t count = grid.bins();
-  static thread_local std::vector<double> moment, drawn, volume, second_moment;
+  static thread_local std::vector<double> moment, drawn, volume, expected;
   static thread_local std::vector<float> masses;
-  for (auto* heap : {&moment, &drawn, &volume, &second_moment}) heap->resize(2 * count);
+  for (auto* heap : {&moment, &drawn, &volume, &expected}) heap->resize(2 * count);
   masses.resize(count);
   for (std::uint32_t b = 0; b < count; ++b) {
     moment[count + b] = bins[b].moment;
@@ -187,32 +188,35 @@ void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bin
   for (std::uint32_t node = count - 1; node > 0; --node)
     for (auto* heap : {&moment, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
   // Each half is drawn to the whole that it is part of, the more the fewer samples it has seen.
-  second_moment[1] = draws > 0 ? moment[1] / draws : 0;
+  expected[1] = draws > 0 ? moment[1] / draws : 0;
   double sum = 0;
+  const bool squared = m_settings.target == FieldSettings::Target::second_moment;
+  const auto wanted = [squared](double m) { return squared ? std::sqrt(m) : m; };
   for (std::uint32_t node = 2; node < 2 * count; ++node) {
-    const double whole = second_moment[node / 2];
+    const double whole = expected[node / 2];
     const double own = volume[node] > 0 && draws > 0 ? moment[node] / (draws * volume[node]) : 0;
-    second_moment[node] = (drawn[node] * own + m_settings.shrink * whole) / (drawn[node] + m_settings.shrink);
-    if (node >= count) sum += std::sqrt(second_moment[node]) * volume[node];
+    expected[node] = (drawn[node] * own + m_settings.shrink * whole) / (drawn[node] + m_settings.shrink);
+    if (node >= count) sum += wanted(expected[node]) * volume[node];
   }
   const double share = sum > 0 ? (1 - m_settings.uniform) * draws / (draws + m_settings.trust) : 0;
   for (std::uint32_t b = 0; b < count; ++b)
     masses[b] = static_cast<float>(volume[count + b] *
-                                   (1 - share + (share > 0 ? share * std::sqrt(second_moment[count + b]) / sum : 0)));
-  halving_probabilities(masses, left);
+                                   (1 - share + (share > 0 ? share * wanted(expected[count + b]) / sum : 0)));
+  grid.set_density(masses, density);
 }
 
 std::shared_ptr<const Field> FieldTrainer::fit() {
   if (!m_cells.empty()) cut_cells();
   const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
-  std::vector<float> light(m_cells.size() * light_bins), scatter(m_cells.size() * scatter_bins);
+  const std::size_t light_stored = m_grids.light.stored(), scatter_stored = m_grids.diffuse.stored();
+  std::vector<HalfProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
   tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
     const Cell& cell = m_cells[c];
     fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light_draws,
-                std::span(light).subspan(c * light_bins, light_bins));
+                light.data() + c * light_stored);
     fit_density(m_grids.grid(VertexNumbers::scatter, cell.kind),
                 std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), cell.scatter_draws,
-                std::span(scatter).subspan(c * scatter_bins, scatter_bins));
+                scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;
   for (const Cell& cell : m_cells) kinds.push_back(cell.kind);

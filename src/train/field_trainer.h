@@ -7,20 +7,13 @@
 
 #include "core/vertex_recorder.h"
 #include "warp/field.h"
+#include "warpath/train.h"
 
 namespace warpath {
 
-struct FieldSettings {
-  std::uint32_t max_cells = 1 << 14;
-  double split_at = 1000;  ///< vertices in a cell after which it is cut in two
-  double shrink = 16;      ///< a bin's second moment is drawn to that of the bins around it as if by so many samples
-  double uniform = 0.15;   ///< share of uniform numbers in every cell; more in cells of few vertices
-  double trust = 64;       ///< vertices in a cell that count as much as the uniform density
-};
-
-/// Learns a field from the vertices of passes. The density of a cell goes with the square root of the second moment of
-/// what comes back, the density that makes the variance of the whole remaining path least.  [Vorba et al. 2019, Path
-/// Guiding in Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding]
+/// Learns a field from the vertices of passes. The density of a bin goes with the mean of what comes back, or with the
+/// root of its second moment, which makes the variance of the whole remaining path least [Vorba et al. 2019, Path
+/// Guiding in Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding] but is known less well.
 class FieldTrainer final : public VertexLearner {
  public:
   /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
@@ -41,7 +34,8 @@ class FieldTrainer final : public VertexLearner {
     std::array<double, FieldTree::kFeatures> sum{}, square{};  // of features
   };
   struct Bin {
-    float moment = 0;  // sum of f^2 / q: over the draws, times the bin's volume, the second moment in the bin
+    float moment =
+        0;  // sum of f / q, or f^2 / q: over the draws of the cell and the bin's volume, the mean of f, or f^2
     float draws = 0;
   };
 
@@ -49,7 +43,7 @@ class FieldTrainer final : public VertexLearner {
   void cut_cells();
   /// extent2: squared width of the scene. Returns false if all vertices of the cell are in one place.
   bool cut(std::uint32_t cell, double extent2);
-  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws, std::span<float> left) const;
+  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws, HalfProbability* density) const;
 
   FieldSettings m_settings;
   FieldGrids m_grids;

@@ -266,7 +266,7 @@ TEST_P(TrainTest, TrainedWarpsCanBeStored) {
   const Candidates candidates = gather_candidates(bump(4), layout, 1, candidate_count(settings));
   const Fit fit = train(candidates, settings);
   const auto path = std::filesystem::temp_directory_path() / fmt::format("warpath-{}-{}.warp", GetParam(), ::getpid());
-  save_warp(path, {fit.proposal, layout, "a scene", {{"seed", "0"}}});
+  save_warp(path, {fit.proposal, nullptr, layout, "a scene", {{"seed", "0"}}});
   const WarpFile loaded = load_warp(path);
   EXPECT_EQ(loaded.layout, layout);
   EXPECT_EQ(loaded.scene, "a scene");

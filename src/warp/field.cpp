@@ -34,27 +34,37 @@ FieldGrids::FieldGrids(int parts)
       mixed({2, 3, 3}),
       delta({4, 2, 2}) {}
 
-Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<float> light_left,
-             std::vector<float> scatter_left)
+Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<HalfProbability> light,
+             std::vector<HalfProbability> scatter)
     : m_tree(std::move(tree)),
       m_grids(std::move(grids)),
       m_kinds(std::move(kinds)),
-      m_light_left(std::move(light_left)),
-      m_scatter_left(std::move(scatter_left)) {
+      m_light(std::move(light)),
+      m_scatter(std::move(scatter)) {
   WARPATH_CHECK_EQ(m_kinds.size(), m_tree.cells());
-  WARPATH_CHECK_EQ(m_light_left.size(), std::size_t{m_tree.cells()} * m_grids.light.bins());
-  WARPATH_CHECK_EQ(m_scatter_left.size(), std::size_t{m_tree.cells()} * m_grids.diffuse.bins());
+  WARPATH_CHECK_EQ(m_light.size(), m_tree.cells() * m_grids.light.stored());
+  WARPATH_CHECK_EQ(m_scatter.size(), m_tree.cells() * m_grids.diffuse.stored());
 }
 
-const float* Field::density(VertexNumbers which, std::uint32_t cell) const {
-  return which == VertexNumbers::light ? m_light_left.data() + std::size_t{cell} * m_grids.light.bins()
-                                       : m_scatter_left.data() + std::size_t{cell} * m_grids.diffuse.bins();
+const HalfProbability* Field::density(VertexNumbers which, std::uint32_t cell) const {
+  return which == VertexNumbers::light ? m_light.data() + cell * m_grids.light.stored()
+                                       : m_scatter.data() + cell * m_grids.diffuse.stored();
 }
 
 void Field::sample(VertexNumbers which, const VertexContext& context, std::size_t n,
                    const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const {
-  for (std::size_t i = 0; i < n; ++i) {
+  // Cells lie all over memory, so they are asked for a while before their turn.
+  constexpr std::size_t kAhead = 8;
+  std::array<std::uint32_t, kAhead> cells;
+  const auto find = [&](std::size_t i) {
     const std::uint32_t cell = m_tree.cell(FieldTree::root_key(context, i), FieldTree::features(context, i));
+    if (cell != FieldTree::kNoCell) __builtin_prefetch(density(which, cell));
+    cells[i % kAhead] = cell;
+  };
+  for (std::size_t i = 0; i < std::min(n, kAhead); ++i) find(i);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t cell = cells[i % kAhead];
+    if (i + kAhead < n) find(i + kAhead);
     const std::array<double, 3> latent{z[0][i], z[1][i], z[2][i]};
     std::array<float, 3> drawn{to_primary(latent[0]), to_primary(latent[1]), to_primary(latent[2])};
     inv_q[i] = 1;
@@ -87,8 +97,13 @@ void Field::save(TensorFile& file, const std::string& prefix) const {
   std::vector<std::uint8_t> kinds;
   for (const SurfaceKind kind : m_kinds) kinds.push_back(static_cast<std::uint8_t>(kind));
   file.put<std::uint8_t>(prefix + "kinds", {cells}, kinds);
-  file.put<float>(prefix + "light", {cells, m_grids.light.bins()}, m_light_left);
-  file.put<float>(prefix + "scatter", {cells, m_grids.diffuse.bins()}, m_scatter_left);
+  // As 32-bit numbers: the file format has no others that would do.
+  const auto put = [&](const char* name, const std::vector<HalfProbability>& densities, std::size_t stored) {
+    const std::vector<std::int32_t> values(densities.begin(), densities.end());
+    file.put<std::int32_t>(prefix + name, {cells, static_cast<std::int64_t>(stored)}, values);
+  };
+  put("light", m_light, m_grids.light.stored());
+  put("scatter", m_scatter, m_grids.diffuse.stored());
 }
 
 std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::string& prefix) {
@@ -107,13 +122,15 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
   std::vector<SurfaceKind> kinds;
   for (const std::uint8_t kind : file.get<std::uint8_t>(prefix + "kinds").values)
     kinds.push_back(static_cast<SurfaceKind>(kind));
-  auto light = file.get<float>(prefix + "light").values, scatter = file.get<float>(prefix + "scatter").values;
-  if (kinds.size() != tree.cells() || light.size() != kinds.size() * grids.light.bins() ||
-      scatter.size() != kinds.size() * grids.diffuse.bins())
-    fail_load(file, prefix, "its cells and their densities do not fit each other");
-  for (const auto* values : {&light, &scatter})
-    for (const float p : *values)
-      if (!(p >= 0 && p <= 1)) fail_load(file, prefix, "a probability is not in [0,1]");
+  const auto densities = [&](const char* name, std::size_t stored) {
+    const auto values = file.get<std::int32_t>(prefix + name).values;
+    if (kinds.size() != tree.cells() || values.size() != kinds.size() * stored)
+      fail_load(file, prefix, "its cells and their densities do not fit each other");
+    for (const std::int32_t p : values)
+      if (p < 0 || p > kWholeProbability) fail_load(file, prefix, "a probability is not in [0,1]");
+    return std::vector<HalfProbability>(values.begin(), values.end());
+  };
+  auto light = densities("light", grids.light.stored()), scatter = densities("scatter", grids.diffuse.stored());
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
                                  std::move(scatter));
 }

@@ -26,9 +26,9 @@ struct FieldGrids {
 /// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers.
 class Field final : public VertexWarp {
  public:
-  /// left: bins() probabilities for each cell, see HalvingGrid; each light grid, and each scatter grid, has as many.
-  Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<float> light_left,
-        std::vector<float> scatter_left);
+  /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers.
+  Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<HalfProbability> light,
+        std::vector<HalfProbability> scatter);
 
   std::string family() const override { return "field"; }
   void sample(VertexNumbers which, const VertexContext& context, std::size_t n, const std::array<const double*, 3>& z,
@@ -42,12 +42,12 @@ class Field final : public VertexWarp {
   const FieldTree& tree() const { return m_tree; }
 
  private:
-  const float* density(VertexNumbers which, std::uint32_t cell) const;
+  const HalfProbability* density(VertexNumbers which, std::uint32_t cell) const;
 
   FieldTree m_tree;
   FieldGrids m_grids;
   std::vector<SurfaceKind> m_kinds;  // of each cell
-  std::vector<float> m_light_left, m_scatter_left;
+  std::vector<HalfProbability> m_light, m_scatter;
 };
 
 }  // namespace warpath

@@ -1,12 +1,37 @@
 #include "warp/halving_density.h"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <vector>
 
 #include "warpath/error.h"
 
 namespace warpath {
+namespace {
+
+constexpr int kSubtreeLevels = 4;
+constexpr std::uint32_t kSubtree = 1u << kSubtreeLevels;  // numbers of a subtree, the first of which is not used
+
+/// Walks down the tree of halvings and knows where the probability of the node it stands on is stored.
+class Walk {
+ public:
+  std::size_t place() const { return m_subtree * kSubtree + m_node; }
+  void go(bool second) {
+    m_node = 2 * m_node + second;
+    if (m_node < kSubtree) return;
+    // Subtree s has the children 16 s + 1 ... 16 s + 16.
+    m_subtree = m_subtree * kSubtree + 1 + (m_node - kSubtree);
+    m_node = 1;
+  }
+
+ private:
+  std::uint32_t m_subtree = 0, m_node = 1;
+};
+
+/// The largest float below a positive one.
+float below(float x) { return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) - 1); }
+
+}  // namespace
 
 HalvingGrid::HalvingGrid(std::array<int, 3> bits, int parts) : m_levels(bits[0] + bits[1] + bits[2]), m_bits(bits) {
   WARPATH_CHECK(m_levels <= kMaxLevels);
@@ -23,6 +48,9 @@ HalvingGrid::HalvingGrid(std::array<int, 3> bits, int parts) : m_levels(bits[0] 
       }
     }
   }
+  std::size_t subtrees = 0;
+  for (int level = 0; level < m_levels; level += kSubtreeLevels) subtrees += std::size_t{1} << level;
+  m_stored = subtrees * kSubtree;
   m_scale = {static_cast<float>(m_parts), static_cast<float>(1 << bits[1]), static_cast<float>(1 << bits[2])};
   for (std::size_t a = 0; a < 3; ++a) m_unit[a] = 1 / static_cast<double>(m_scale[a]);
   m_volume = static_cast<float>(m_unit[0] * m_unit[1] * m_unit[2]);
@@ -44,52 +72,65 @@ std::uint32_t HalvingGrid::bin(float y0, float y1, float y2) const {
   return bin;
 }
 
-float HalvingGrid::sample(const float* left, const std::array<double, 3>& z, std::array<float, 3>& y) const {
+void HalvingGrid::set_density(std::span<const float> masses, HalfProbability* density) const {
+  static thread_local std::vector<double> mass;
+  const std::uint32_t count = bins();
+  mass.resize(2 * count);
+  std::copy(masses.begin(), masses.end(), mass.begin() + count);
+  for (std::uint32_t node = count - 1; node > 0; --node) mass[node] = mass[2 * node] + mass[2 * node + 1];
+  std::fill_n(density, m_stored, HalfProbability{0});
+  for (int level = 0; level < m_levels; ++level)
+    for (std::uint32_t node = 1u << level; node < 2u << level; ++node) {
+      Walk walk;
+      for (int k = level - 1; k >= 0; --k) walk.go(node >> k & 1);
+      const double first = mass[2 * node], second = mass[2 * node + 1];
+      int p = kWholeProbability / 2;
+      if (second == 0 && first > 0) p = kWholeProbability;
+      if (first == 0 && second > 0) p = 0;
+      if (first > 0 && second > 0)
+        p = std::clamp(static_cast<int>(first / (first + second) * kWholeProbability + 0.5), 1, kWholeProbability - 1);
+      density[walk.place()] = static_cast<HalfProbability>(p);
+    }
+}
+
+float HalvingGrid::sample(const HalfProbability* density, const std::array<double, 3>& z,
+                          std::array<float, 3>& y) const {
   // Instead of stretching z to [0,1) after each halving, `width` keeps track of how wide its range has become.
   std::array<double, 3> offset = z, width{1, 1, 1};
   std::array<std::uint32_t, 3> place{};
-  std::uint32_t node = 1;
+  Walk walk;
   for (int level = 0; level < m_levels; ++level) {
     const std::size_t a = m_axis[static_cast<std::size_t>(level)];
-    const double p = left[node], first = p * width[a];
-    // p = 1 leaves no second half, whatever rounding did to the offset.
-    const bool second = offset[a] >= first && p < 1;
-    offset[a] -= second ? first : 0;
-    width[a] = second ? width[a] - first : first;
+    const int p = density[walk.place()];
+    const double first = p * (1.0 / kWholeProbability) * width[a];
+    // A whole leaves no second half, whatever rounding did to the offset. No branches: they could not be predicted.
+    const bool second = (offset[a] >= first) & (p < kWholeProbability);
+    const double is_second = second;
+    offset[a] -= is_second * first;
+    width[a] = first + is_second * (width[a] - 2 * first);
     place[a] = 2 * place[a] + second;
-    node = 2 * node + second;
+    walk.go(second);
   }
   for (std::size_t a = 0; a < 3; ++a) {
     const double within = width[a] > 0 ? std::min(offset[a] / width[a], 1.0) : 0.5;
     // The last float below the bin's end: the sample must not leave the bin whose density it is divided by.
     const float begin = static_cast<float>(place[a] * m_unit[a]);
     const float end = static_cast<float>((place[a] + 1) * m_unit[a]);
-    y[a] = std::clamp(static_cast<float>((place[a] + within) * m_unit[a]), begin, std::nextafter(end, begin));
+    y[a] = std::clamp(static_cast<float>((place[a] + within) * m_unit[a]), begin, below(end));
   }
   return static_cast<float>(m_volume / (width[0] * width[1] * width[2]));
 }
 
-float HalvingGrid::inverse_density(const float* left, std::uint32_t bin) const {
+float HalvingGrid::inverse_density(const HalfProbability* density, std::uint32_t bin) const {
   double q = 1;
-  std::uint32_t node = 1;
+  Walk walk;
   for (int level = m_levels - 1; level >= 0; --level) {
-    const std::uint32_t second = bin >> level & 1;
-    q *= second ? 1 - static_cast<double>(left[node]) : left[node];
-    node = 2 * node + second;
+    const bool second = bin >> level & 1;
+    const double p = density[walk.place()] * (1.0 / kWholeProbability);
+    q *= second ? 1 - p : p;
+    walk.go(second);
   }
   return static_cast<float>(m_volume / q);
-}
-
-void halving_probabilities(std::span<const float> masses, std::span<float> left) {
-  const std::size_t bins = masses.size();
-  static thread_local std::vector<double> mass;
-  mass.assign(2 * bins, 0);
-  std::copy(masses.begin(), masses.end(), mass.begin() + static_cast<std::ptrdiff_t>(bins));
-  for (std::size_t node = bins - 1; node > 0; --node) {
-    mass[node] = mass[2 * node] + mass[2 * node + 1];
-    left[node] = mass[node] > 0 ? static_cast<float>(mass[2 * node] / mass[node]) : 0.5f;
-  }
-  left[0] = 0;
 }
 
 }  // namespace warpath

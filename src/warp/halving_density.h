@@ -1,12 +1,20 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
 namespace warpath {
 
+/// Probability of the first half of a halving, in units of kWholeProbability.
+using HalfProbability = std::uint16_t;
+inline constexpr int kWholeProbability = 1 << 15;
+
 /// The unit cube of three numbers cut into equal bins by halvings, the numbers taking turns. Bins are numbered by the
-/// halvings that lead to them, the first as the highest bit; node i of the tree of halvings has the children 2i, 2i+1.
+/// halvings that lead to them, the first as the highest bit.
+///
+/// A density is a probability for each node of the tree of halvings. They are stored in subtrees of four levels, which
+/// fit half a cache line, so that a sample touches as few lines as can be.
 class HalvingGrid {
  public:
   static constexpr int kMaxLevels = 12;
@@ -20,12 +28,17 @@ class HalvingGrid {
   /// Volume of a bin: 0 if it does not exist.
   float volume(std::uint32_t bin) const { return part_of(bin) < m_parts ? m_volume : 0; }
   std::uint32_t bin(float y0, float y1, float y2) const;
+  /// How many numbers a density takes.
+  std::size_t stored() const { return m_stored; }
 
-  /// y = the point that the density `left` sends the latent z to; returns 1 / q(y). left: for each node of the tree of
-  /// halvings, from index 1, the probability of its first half.
-  float sample(const float* left, const std::array<double, 3>& z, std::array<float, 3>& y) const;
+  /// The density whose bins have these masses, bins() of them; not negative, 0 where a bin does not exist. Bins of some
+  /// mass keep some.
+  void set_density(std::span<const float> masses, HalfProbability* density) const;
+
+  /// y = the point that the density sends the latent z to; returns 1 / q(y).
+  float sample(const HalfProbability* density, const std::array<double, 3>& z, std::array<float, 3>& y) const;
   /// 1 / q in a bin.
-  float inverse_density(const float* left, std::uint32_t bin) const;
+  float inverse_density(const HalfProbability* density, std::uint32_t bin) const;
 
  private:
   /// Which of the first number's parts a bin lies in.
@@ -33,15 +46,12 @@ class HalvingGrid {
 
   int m_levels;
   std::uint32_t m_parts;
+  std::size_t m_stored;
   float m_volume;  // of a bin that exists
   std::array<int, 3> m_bits;
   std::array<float, 3> m_scale;  // number -> place in units of its bins
   std::array<double, 3> m_unit;  // and back
   std::array<std::uint8_t, kMaxLevels> m_axis{};
 };
-
-/// Turns masses of bins (not negative; those of bins that do not exist are 0) into the probabilities of first halves.
-/// left: bins() entries, the first is not used.
-void halving_probabilities(std::span<const float> masses, std::span<float> left);
 
 }  // namespace warpath

@@ -1,6 +1,7 @@
 #include "warpath/warp_file.h"
 
 #include "core/tensor_file.h"
+#include "warp/field.h"
 #include "warp/load.h"
 #include "warpath/error.h"
 
@@ -12,15 +13,25 @@ namespace {
 constexpr std::string_view kFormat = "warpath 1";
 const std::string kPrefix = "warp.";
 const std::string kSetting = "setting.";
+constexpr std::string_view kField = "field";
 
 }  // namespace
 
+std::string family_of(const WarpFile& file) {
+  return file.proposal ? file.proposal->family() : file.vertex_warp->family();
+}
+
 void save_warp(const std::filesystem::path& path, const WarpFile& file) {
-  WARPATH_CHECK_EQ(file.proposal->dims(), file.layout.dims());
+  WARPATH_CHECK((file.proposal != nullptr) != (file.vertex_warp != nullptr));
   TensorFile tensors;
-  file.proposal->save(tensors, kPrefix);
+  if (file.proposal) {
+    WARPATH_CHECK_EQ(file.proposal->dims(), file.layout.dims());
+    file.proposal->save(tensors, kPrefix);
+  } else {
+    file.vertex_warp->save(tensors, kPrefix);
+  }
   tensors.metadata()["format"] = kFormat;
-  tensors.metadata()["family"] = file.proposal->family();
+  tensors.metadata()["family"] = family_of(file);
   tensors.metadata()["dims"] = std::to_string(file.layout.dims());
   tensors.metadata()["layout"] = file.layout.name();
   tensors.metadata()["scene"] = file.scene;
@@ -34,15 +45,19 @@ WarpFile load_warp(const std::filesystem::path& path) {
     throw FileError(
         fmt::format("{}: format \"{}\"; this version of warpath reads \"{}\"", path.string(), format, kFormat));
   WarpFile file;
-  try {
-    file.layout = Layout::parse(tensors.meta("layout"));
-  } catch (const ConfigError& error) {
-    throw FileError(fmt::format("{}: layout: {}", path.string(), error.what()));
+  if (tensors.meta(kPrefix + "family") == kField) {
+    file.vertex_warp = Field::load(tensors, kPrefix);
+  } else {
+    try {
+      file.layout = Layout::parse(tensors.meta("layout"));
+    } catch (const ConfigError& error) {
+      throw FileError(fmt::format("{}: layout: {}", path.string(), error.what()));
+    }
+    file.proposal = load_proposal(tensors, kPrefix);
+    if (file.proposal->dims() != file.layout.dims())
+      throw FileError(fmt::format("{}: its warp has {} dimensions, its layout \"{}\" {}", path.string(),
+                                  file.proposal->dims(), file.layout.name(), file.layout.dims()));
   }
-  file.proposal = load_proposal(tensors, kPrefix);
-  if (file.proposal->dims() != file.layout.dims())
-    throw FileError(fmt::format("{}: its warp has {} dimensions, its layout \"{}\" {}", path.string(),
-                                file.proposal->dims(), file.layout.name(), file.layout.dims()));
   file.scene = tensors.meta("scene");
   for (const auto& [name, value] : tensors.metadata())
     if (name.starts_with(kSetting)) file.settings[name.substr(kSetting.size())] = value;

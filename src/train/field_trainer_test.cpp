@@ -1,0 +1,162 @@
+#include "train/field_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/rng.h"
+
+namespace warpath {
+namespace {
+
+/// Diffuse vertices on a floor, x and z in [0,1): what comes back lies in a corner of the numbers that depends on x.
+struct Batch {
+  Batch(std::uint64_t seed, std::size_t n) : lanes(n), material(n), kind(n), light(n), beyond(n), ones(n, 1), zeros(n) {
+    for (auto& values : floats) values.assign(n, 0);
+    for (auto& values : numbers) values.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::uint64_t key = sample_key(seed, i);
+      lanes[i] = static_cast<std::uint32_t>(i);
+      kind[i] = static_cast<std::uint8_t>(SurfaceKind::diffuse);
+      floats[0][i] = sample_float(key, 10);
+      floats[2][i] = sample_float(key, 11);
+      floats[4][i] = 1;  // normal
+      for (std::uint32_t d = 0; d < kBounceDimensions; ++d) numbers[d][i] = sample_float(key, d);
+      const bool left = floats[0][i] < 0.5f;
+      light[i] = (numbers[1][i] < 0.25f) == left ? 1.0f : 0.1f;
+      beyond[i] = numbers[4][i] < 0.5f && numbers[5][i] < 0.5f ? (numbers[6][i] < 0.5f ? 6.0f : 0.0f) : 1.0f;
+    }
+  }
+  VertexContext context() const {
+    VertexContext c;
+    for (std::size_t k = 0; k < 3; ++k) {
+      c.position[k] = floats[k].data();
+      c.normal[k] = floats[3 + k].data();
+      c.wi[k] = floats[6 + k].data();
+    }
+    c.kind = kind.data();
+    c.material = material.data();
+    return c;
+  }
+  VertexRecords records() const {
+    VertexRecords r;
+    r.bounce = 1;
+    r.lanes = lanes;
+    r.context = context();
+    for (std::size_t d = 0; d < kBounceDimensions; ++d) r.numbers[d] = numbers[d].data();
+    r.inv_q_light = r.inv_q_scatter = ones.data();
+    r.light = light.data();
+    r.beyond = beyond.data();
+    return r;
+  }
+  std::vector<std::uint32_t> lanes, material;
+  std::vector<std::uint8_t> kind;
+  std::array<std::vector<float>, 9> floats;
+  std::array<std::vector<float>, kBounceDimensions> numbers;
+  std::vector<float> light, beyond, ones, zeros;
+};
+
+constexpr std::size_t kBatch = 4096;
+
+void teach(FieldTrainer& trainer, const Batch& batch) {
+  const auto recorder = trainer.make_recorder();
+  recorder->record(batch.records());
+  trainer.merge(*recorder);
+}
+
+std::shared_ptr<const Field> taught(const FieldSettings& settings, int batches) {
+  FieldTrainer trainer(settings, 1);
+  std::shared_ptr<const Field> field;
+  for (int b = 0; b < batches; ++b) {
+    teach(trainer, Batch(static_cast<std::uint64_t>(b), kBatch));
+    if (b % 8 == 7) field = trainer.fit();
+  }
+  return trainer.fit();
+}
+
+/// q of numbers at one of the vertices of a batch.
+float density(const Field& field, VertexNumbers which, const Batch& batch, std::size_t i, std::array<float, 3> y) {
+  VertexContext c = batch.context();
+  for (auto* array : {&c.position, &c.normal, &c.wi})
+    for (const float*& values : *array) values += i;
+  c.kind += i, c.material += i;
+  float inv_q;
+  field.inverse_density(which, c, 1, {&y[0], &y[1], &y[2]}, &inv_q);
+  return 1 / inv_q;
+}
+
+TEST(FieldTrainer, DensityGoesWithTheMeanOrTheRootOfTheSecondMoment) {
+  const Batch batch(1, 1);
+  // On a quarter of the square of directions `beyond` is 6 or 0, with mean 3 and second moment 18; elsewhere it is 1.
+  for (const auto& [target, value] : {std::pair{FieldSettings::Target::mean, 3.0},
+                                      std::pair{FieldSettings::Target::second_moment, std::sqrt(18.0)}}) {
+    FieldSettings settings;
+    settings.max_cells = 1;
+    settings.uniform = 0.1;
+    settings.target = target;
+    const auto field = taught(settings, 100);
+    const double mean = 0.25 * value + 0.75;
+    const auto q = [&](float u, float v) { return density(*field, VertexNumbers::scatter, batch, 0, {0.5f, u, v}); };
+    EXPECT_NEAR(q(0.3f, 0.2f), 0.1 + 0.9 * value / mean, 0.1);
+    EXPECT_NEAR(q(0.3f, 0.7f), 0.1 + 0.9 / mean, 0.05);
+    EXPECT_NEAR(q(0.8f, 0.7f), 0.1 + 0.9 / mean, 0.05);
+  }
+}
+
+TEST(FieldTrainer, CellsTellPlacesApart) {
+  FieldSettings settings;
+  settings.split_at = 5000;
+  settings.uniform = 0.1;
+  const auto field = taught(settings, 100);
+  EXPECT_GT(field->tree().cells(), 40u);
+  EXPECT_LT(field->tree().cells(), 200u);
+  const Batch batch(1, 200);
+  for (std::size_t i = 0; i < 200; ++i) {
+    if (std::fabs(batch.floats[0][i] - 0.5f) < 0.1f) continue;  // cells that reach over the border know both sides
+    const bool left = batch.floats[0][i] < 0.5f;
+    const float low = density(*field, VertexNumbers::light, batch, i, {0.5f, 0.1f, 0.5f});
+    const float high = density(*field, VertexNumbers::light, batch, i, {0.5f, 0.8f, 0.5f});
+    EXPECT_TRUE(left ? low > 3 * high : high > 3 * low) << low << " " << high << " at " << batch.floats[0][i];
+  }
+}
+
+TEST(FieldTrainer, FewVerticesAreNotBelieved) {
+  FieldTrainer trainer({}, 1);
+  teach(trainer, Batch(1, 2));
+  const auto field = trainer.fit();
+  const Batch batch(1, 1);
+  for (const float y : {0.1f, 0.4f, 0.9f})
+    EXPECT_NEAR(density(*field, VertexNumbers::scatter, batch, 0, {0.5f, y, y}), 1, 0.2);
+}
+
+TEST(FieldTrainer, ValuesThatAreNotFiniteTeachNothing) {
+  FieldTrainer trainer({}, 1);
+  Batch batch(1, kBatch);
+  std::fill(batch.beyond.begin(), batch.beyond.end(), std::nanf(""));
+  std::fill(batch.light.begin(), batch.light.end(), INFINITY);
+  teach(trainer, batch);
+  const auto field = trainer.fit();
+  for (const auto which : {VertexNumbers::light, VertexNumbers::scatter})
+    EXPECT_FLOAT_EQ(density(*field, which, batch, 0, {0.1f, 0.2f, 0.3f}), 1);
+}
+
+TEST(FieldTrainer, NumberOfCellsIsBounded) {
+  FieldSettings settings;
+  settings.split_at = 10;
+  settings.max_cells = 37;
+  EXPECT_EQ(taught(settings, 8)->tree().cells(), 37u);
+}
+
+TEST(FieldTrainer, VerticesInOnePlaceStayOneCell) {
+  FieldSettings settings;
+  settings.split_at = 10;
+  FieldTrainer trainer(settings, 1);
+  Batch batch(1, kBatch);
+  for (auto& values : batch.floats) std::fill(values.begin(), values.end(), 0.25f);
+  teach(trainer, batch);
+  EXPECT_EQ(trainer.fit()->tree().cells(), 1u);
+}
+
+}  // namespace
+}  // namespace warpath
