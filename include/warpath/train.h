@@ -16,7 +16,7 @@ struct FlowTraining {
   enum class Loss { likelihood, variance } loss = Loss::variance;
   double rate = 6e-3;  ///< Adam's step size at the start; it falls when the held-out loss no longer does
   int batch = 2000;
-  int max_steps = 3000;      ///< training ends sooner, when the held-out loss no longer falls
+  int max_steps = 10'000;    ///< training ends sooner, when the held-out loss no longer falls
   double held_out = 0.05;    ///< share of the examples that is never trained on
   double uniform = 0.1;      ///< share of uniform samples that Loss::variance counts on
   double average = 0.998;    ///< decay per step of the moving average of the weights that is handed out; 0 for none
@@ -43,11 +43,15 @@ RealNvpSettings released_realnvp();
 
 /// Settings of the rational-quadratic spline flow [DBMP19] and its training.
 struct SplineSettings : FlowTraining {
-  int couplings = 4;
-  int width = 64;          ///< neurons in a hidden layer, a multiple of 16
+  SplineSettings() {
+    rate = 1e-2;
+    max_steps = 2000;
+  }
+  int couplings = 6;
+  int width = 32;          ///< neurons in a hidden layer, a multiple of 16
   int blocks = 1;          ///< residual blocks of two dense layers in each coupling's network
-  int bins = 16;           ///< of each spline, 2 to 64
-  int encoding_bins = 16;  ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: the numbers alone
+  int bins = 8;            ///< of each spline, 2 to 64
+  int encoding_bins = 32;  ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: the numbers alone
 };
 
 struct KdTreeSettings {
