@@ -24,13 +24,14 @@ void for_each_block(std::size_t size, Each&& each) {
 
 }  // namespace
 
-Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64_t seed) {
+Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64_t seed, float most) {
+  const auto target = [&](std::size_t i) { return std::min(candidates.target[i], most); };
   const std::size_t blocks = (candidates.size() + kBlock - 1) / kBlock;
   // starts[b] is the running sum before block b.
   std::vector<double> sums(blocks), starts(blocks + 1);
   for_each_block(candidates.size(), [&](std::size_t block, std::size_t first, std::size_t end) {
     double sum = 0;
-    for (std::size_t i = first; i < end; ++i) sum += candidates.target[i];
+    for (std::size_t i = first; i < end; ++i) sum += target(i);
     sums[block] = sum;
   });
   for (std::size_t block = 0; block < blocks; ++block) starts[block + 1] = starts[block] + sums[block];
@@ -43,7 +44,7 @@ Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64
   const double mean = total / static_cast<double>(candidates.size());
   const auto take = [&](std::size_t candidate, std::uint64_t k) {
     candidates.primary_sample(candidate, &examples.y(k, 0));
-    examples.inv_q[k] = static_cast<float>(mean / static_cast<double>(candidates.target[candidate]));
+    examples.inv_q[k] = static_cast<float>(mean / static_cast<double>(target(candidate)));
   };
   const std::uint64_t stream = mix64(seed);
   const auto point = [&](std::uint64_t k) {
@@ -64,8 +65,8 @@ Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64
     double sum = 0;
     std::size_t chosen = first;  // the last candidate with g > 0 takes what rounding leaves
     for (std::size_t i = first; i < end && k < last; ++i) {
-      if (!(candidates.target[i] > 0)) continue;
-      sum += candidates.target[i];
+      if (!(target(i) > 0)) continue;
+      sum += target(i);
       chosen = i;
       for (; k < last && point(k) - starts[block] < sum; ++k) take(i, k);
     }

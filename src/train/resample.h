@@ -1,16 +1,19 @@
 #pragma once
+#include <limits>
+
 #include "train/training_data.h"
 
 namespace warpath {
 
 /// Sample-importance resampling [TCE05]: `count` examples drawn from the candidates with probability proportional to g,
 /// so that they follow the density of g. Stratified: example k lies at (k + u_k) / count of the running sum, so that a
-/// candidate's number of copies is within two of its expectation. Weights are 1,
-/// inv_q is mean g / g. Rows stand in the order of the
-/// candidates: copies of one are adjacent (a bright candidate has many, and all of them say the same: hold out whole
-/// ranges of rows, or a fit is judged by what it was fitted to), and a minibatch must be shuffled by who takes it.
-/// Empty if no candidate has g > 0. Sums are in double, and the same for any number of threads.
-Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64_t seed);
+/// candidate's number of copies is within two of its expectation. Weights are 1, inv_q is mean g / g. A g above `most`
+/// counts as `most`: rare bright paths teach a density less than they cost. Rows stand in the order of the candidates:
+/// copies of one are adjacent (a bright candidate has many, and all of them say the same: hold out whole ranges of
+/// rows, or a fit is judged by what it was fitted to), and a minibatch must be shuffled by who takes it. Empty if no
+/// candidate has g > 0. Sums are in double, and the same for any number of threads.
+Examples resample(const Candidates& candidates, std::uint64_t count, std::uint64_t seed,
+                  float most = std::numeric_limits<float>::infinity());
 
 /// The candidates first ... first + count - 1 with their targets as weights, those with g = 0 among them.
 Examples weighted_examples(const Candidates& candidates, std::uint64_t first, std::uint64_t count);

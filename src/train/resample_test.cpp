@@ -57,6 +57,23 @@ TEST(Resample, CopiesAreWithinTwoOfTheirExpectation) {
   }
 }
 
+TEST(Resample, TargetsAreCutOff) {
+  const Candidates candidates = with_targets({1, 0, 100, 3});
+  const Examples examples = resample(candidates, 8'000, 7, 4.0f);
+  const std::vector<int> count = copies(candidates, examples);
+  EXPECT_NEAR(count[0], 1'000, 2);
+  EXPECT_EQ(count[1], 0);
+  EXPECT_NEAR(count[2], 4'000, 2);
+  EXPECT_NEAR(count[3], 3'000, 2);
+  for (std::size_t k = 0; k < examples.size(); ++k) {
+    float y[2];
+    candidates.primary_sample(2, y);
+    if (examples.y(k, 0) == y[0] && examples.y(k, 1) == y[1]) {
+      EXPECT_FLOAT_EQ(examples.inv_q[k], 2.0f / 4) << "mean g / g, both cut off";
+    }
+  }
+}
+
 TEST(Resample, IsUnbiased) {
   // The mean number of copies over seeds; each is a sum of two or three coins, so its variance is below 3/4.
   const Candidates candidates = with_targets({1, 0, 2, 0.5f, 4, 0, 1.5f});

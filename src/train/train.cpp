@@ -23,6 +23,8 @@ constexpr std::size_t kMaxTreeBytes = 3ull << 30;  // rows that a kd-tree may be
 
 // Rows that a spline flow learns from, drawn from the candidates it has anyway: with fewer it soon knows them by heart.
 constexpr std::uint64_t kSplineRows = std::uint64_t{1} << 22;
+// Brighter candidates teach a spline flow no more than this, in units of E[g^2] / E[g], the mean over examples.
+constexpr double kSplineMostTarget = 3;
 
 /// The component that was learned: a mixture's first one that is not uniform.
 const Proposal* learned(const Proposal* proposal) {
@@ -103,8 +105,8 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
     throw ConfigError(fmt::format("the warp to start from has {} dimensions, not {}", init->dims(), dims));
   const auto uniform = std::make_shared<const Uniform>(dims);
   if (settings.family == "uniform") return {uniform, {.points = {}, .seconds = 0, .stopped = "nothing to learn"}};
-  if (!(target_moments(candidates).mean > 0))
-    return {uniform, {.points = {}, .seconds = 0, .stopped = "no candidate has any light"}};
+  const TargetMoments moments = target_moments(candidates);
+  if (!(moments.mean > 0)) return {uniform, {.points = {}, .seconds = 0, .stopped = "no candidate has any light"}};
 
   init = learned(init);
   Fit fit;
@@ -114,7 +116,8 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
     const std::uint64_t rows =
         spline ? std::max(settings.examples, std::min<std::uint64_t>(candidates.size(), kSplineRows))
                : settings.examples;
-    const Examples examples = resample(candidates, rows, mix64(settings.seed + 1));
+    const double most = spline ? kSplineMostTarget * moments.mean_square / moments.mean : HUGE_VAL;
+    const Examples examples = resample(candidates, rows, mix64(settings.seed + 1), static_cast<float>(most));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const auto with_uniform = [&](auto flow) {
       flow.uniform = settings.uniform;
