@@ -233,6 +233,9 @@ TrainSettings quick(const std::string& family) {
   settings.realnvp.couplings = 4;
   settings.realnvp.width = 16;
   settings.realnvp.max_steps = 100;
+  settings.spline.couplings = 2;
+  settings.spline.width = 16;
+  settings.spline.max_steps = 100;
   return settings;
 }
 
@@ -244,8 +247,9 @@ TEST_P(TrainTest, FitsMixesAndKeepsEveryPromise) {
     const Layout layout = layout_of(dims);
     const Candidates candidates = gather_candidates(bump(dims), layout, 1, candidate_count(settings));
     const Fit fit = train(candidates, settings);
+    const bool flow = settings.family == "realnvp" || settings.family == "spline";
     CheckOptions options;
-    options.log_q_tolerance = settings.family == "realnvp" ? 1e-3 : 1e-9;
+    options.log_q_tolerance = flow ? 1e-3 : 1e-9;
     EXPECT_EQ(check_proposal(*fit.proposal, options), "");
     EXPECT_EQ(fit.proposal->dims(), dims);
     EXPECT_FALSE(fit.log.stopped.empty());
@@ -253,8 +257,8 @@ TEST_P(TrainTest, FitsMixesAndKeepsEveryPromise) {
       EXPECT_EQ(fit.proposal->family(), "mixture");
       ASSERT_FALSE(fit.log.points.empty());
       if (dims == 1 && settings.family == "realnvp") continue;  // a coupling has nothing to look at
-      // Better than the uniform density: -ln q, or where a Real NVP starts, ln E[g / q].
-      EXPECT_LT(fit.log.points.back().held_out, settings.family == "realnvp" ? fit.log.points.front().held_out : 0.0);
+      // Better than the uniform density: -ln q, or where a flow starts, ln E[g / q].
+      EXPECT_LT(fit.log.points.back().held_out, flow ? fit.log.points.front().held_out : 0.0);
       EXPECT_LT(second_moment(bump(dims), *fit.proposal), 0.8 * second_moment(bump(dims), Uniform(dims)));
     }
   }
@@ -281,7 +285,7 @@ TEST_P(TrainTest, TrainedWarpsCanBeStored) {
   std::filesystem::remove(path);
 }
 
-INSTANTIATE_TEST_SUITE_P(Families, TrainTest, testing::Values("uniform", "grid", "kdtree", "realnvp"),
+INSTANTIATE_TEST_SUITE_P(Families, TrainTest, testing::Values("uniform", "grid", "kdtree", "realnvp", "spline"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(Train, HandsOutTheBareWarpOnRequest) {
@@ -294,7 +298,7 @@ TEST(Train, HandsOutTheBareWarpOnRequest) {
 TEST(Train, GivesTheUniformProposalWhereThereIsNoLight) {
   const TestIntegrand dark(2, 1, [](auto, auto f) { f[0] = 0; });
   const Candidates candidates = gather_candidates(dark, layout_of(2), 1, 1000);
-  for (const char* family : {"grid", "kdtree", "realnvp"}) {
+  for (const char* family : {"grid", "kdtree", "realnvp", "spline"}) {
     const Fit fit = train(candidates, quick(family));
     EXPECT_EQ(fit.proposal->family(), "uniform");
     EXPECT_EQ(fit.log.stopped, "no candidate has any light");
