@@ -18,6 +18,7 @@ SplineSettings small() {
   s.couplings = 4;
   s.width = 16;
   s.bins = 8;
+  s.encoding_bins = 16;
   return s;
 }
 
