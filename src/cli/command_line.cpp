@@ -135,7 +135,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
       ->capture_default_str();
   sub->add_option(
          "--warp", command.warp,
-         "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field")
+         "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field, auto")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");

@@ -183,6 +183,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   result.warp_seconds = cost.warp_seconds;
   result.trace_seconds = cost.trace_seconds + cost.emission_seconds;
   result.train_seconds += prepared.guide.fit_seconds;
+  if (!prepared.guide.choice.empty()) result.training_stopped = prepared.guide.choice;
   result.train_samples += prepared.guide.taught;
   result.total_seconds = prepare_seconds + prepared.guide.fit_seconds + cost.total();
   result.non_finite = estimator.non_finite();

@@ -13,7 +13,8 @@
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 7> kFamilies{"none", "uniform", "grid", "kdtree", "realnvp", "spline", "field"};
+constexpr std::array<std::string_view, 8> kFamilies{"none",    "uniform", "grid",  "kdtree",
+                                                    "realnvp", "spline",  "field", "auto"};
 constexpr std::string_view kDefaultDimensions = "film+bounce1";
 
 /// Candidates are drawn from other numbers than the image, whatever its seed.
@@ -42,10 +43,10 @@ Method parse_method(const std::string& text) {
                                     text.substr(colon + 1)));
     return method;
   }
-  if (method.family == "field") {
+  if (method.family == "field" || method.family == "auto") {
     if (colon != std::string::npos)
-      throw ConfigError(
-          fmt::format("\"{}\": a field warps the numbers of every vertex; it has no dimensions to choose", text));
+      throw ConfigError(fmt::format("\"{}\": {} warps the numbers of every vertex; it has no dimensions to choose",
+                                    text, method.family));
     return method;
   }
   method.layout =
@@ -86,8 +87,9 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     prepared.guide.warp = file.vertex_warp;
     return prepared;
   }
-  if (method.family == "field") {
+  if (method.family == "field" || method.family == "auto") {
     prepared.guide.trainer = std::make_unique<FieldTrainer>(m_settings.field, m_tracer->emitters());
+    prepared.guide.automatic = method.family == "auto";
     return prepared;
   }
   TrainSettings settings = m_settings;

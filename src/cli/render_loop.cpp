@@ -1,9 +1,12 @@
 #include "cli/render_loop.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "core/interrupt.h"
+#include "core/log.h"
 
 namespace warpath {
 
@@ -13,14 +16,53 @@ namespace {
 
 double seconds_since(Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); }
 
+/// What a path costs with a warp at its vertices, over what one costs without, by count of operations: looking a vertex
+/// up and two densities, against two rays, a BSDF and a light.
+constexpr double kVertexWarpCost = 1.35;
+/// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
+constexpr int kTrialSpp = 8;
+
+/// How `auto` chooses between uniform numbers and the warp at vertices: error of one sample times its cost, of the last
+/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp.
+class Trial {
+ public:
+  /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
+  Trial(bool by_clock) : m_by_clock(by_clock) {}
+
+  /// Whether the pass that begins at `done` samples per pixel is still drawn uniformly.
+  static bool is_plain(int done) { return done < kTrialSpp; }
+  void judge(const ImageEstimator& estimator, int before, double seconds_per_spp, Guide& guide) {
+    const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
+    if (is_plain(before)) {
+      m_plain = error * (m_by_clock ? seconds_per_spp : 1);
+      return;
+    }
+    const double warped = error * (m_by_clock ? seconds_per_spp : kVertexWarpCost), gain = m_plain / warped;
+    const bool pays = !(gain < 1);
+    guide.choice = fmt::format("{}: error times cost is {:.2f} x less with a field at every vertex",
+                               pays ? "field" : "plain path tracing", gain);
+    log::info("auto: {}", guide.choice);
+    if (!pays) {
+      guide.warp = nullptr;
+      guide.trainer = nullptr;
+    }
+    guide.automatic = false;
+  }
+
+ private:
+  bool m_by_clock;
+  double m_plain = 0;
+};
+
 /// One pass; what it teaches goes into the guide if another is to follow.
-void add_pass(ImageEstimator& estimator, int spp, bool last, Guide& guide, const Progress& progress,
+void add_pass(ImageEstimator& estimator, int spp, bool warped, bool last, Guide& guide, const Progress& progress,
               const std::function<bool()>& stop) {
   if (guide.empty()) return estimator.add_pass(spp, progress, stop);
   const bool learns = guide.trainer && (guide.keep || !last);
   const std::uint64_t before = estimator.cost().samples;
-  estimator.add_guided_pass(spp, {guide.warp.get(), learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
-                            stop);
+  estimator.add_guided_pass(
+      spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
+      stop);
   if (!learns || g_interrupted) return;
   const auto start = Clock::now();
   guide.warp = guide.trainer->fit();
@@ -35,6 +77,7 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
   const auto left = [&] { return -seconds_since(*budget.deadline); };
   const double whole = budget.deadline ? std::max(1e-3, left()) : 1;
   double per_spp = 0;  // seconds, of the pass before
+  Trial trial(budget.deadline.has_value());
   int done = 0;
   while (!g_interrupted) {
     int next = std::max(1, done);
@@ -59,8 +102,9 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
     };
     const auto stop = [&] { return budget.deadline && before > 0 && Clock::now() > *budget.deadline; };
     const auto start = Clock::now();
-    add_pass(estimator, next, last, guide, report, stop);
+    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), last, guide, report, stop);
     per_spp = seconds_since(start) / next;
+    if (guide.automatic && !g_interrupted) trial.judge(estimator, before, per_spp, guide);
     done += next;
     checkpoint();
   }

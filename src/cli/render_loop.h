@@ -2,6 +2,7 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "core/ordered.h"
 #include "estimate/image_estimator.h"
@@ -20,6 +21,8 @@ struct Guide {
   std::optional<Objective> objective{};      ///< where samples go; else every pixel has as many
   std::shared_ptr<const VertexWarp> warp{};  ///< draws the numbers of vertices; null: they are uniform
   std::unique_ptr<FieldTrainer> trainer{};   ///< learns the warp from each pass for the next; null: it stays
+  bool automatic = false;                    ///< the warp is given up if it does not pay for what it costs
+  std::string choice{};                      ///< what was decided, and why
   bool keep = false;                         ///< learns from the last pass, too: the warp is wanted, not the image
   double fit_seconds = 0;                    ///< spent between passes
   std::uint64_t taught = 0;                  ///< paths that the warp has learned from

@@ -48,7 +48,7 @@ void run(const TrainCommand& command) {
   const CommonOptions& common = command.common;
   const Threads threads(common);
   const Method method = parse_method(command.warp);
-  if (method.family == "none" || method.family == "uniform" || !method.file.empty())
+  if (method.family == "none" || method.family == "uniform" || method.family == "auto" || !method.file.empty())
     throw ConfigError(fmt::format(
         "--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp or spline, or field",
         command.warp));

@@ -4,6 +4,17 @@
 
 namespace warpath {
 
+VertexContext VertexContext::from(std::size_t count) const {
+  VertexContext rest = *this;
+  for (auto* arrays : {&rest.position, &rest.normal, &rest.wi, &rest.albedo})
+    for (const float*& values : *arrays)
+      if (values) values += count;
+  if (roughness) rest.roughness += count;
+  if (kind) rest.kind += count;
+  if (material) rest.material += count;
+  return rest;
+}
+
 bool UniformSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext*, float* u0, float* u1,
                          float*) {
   const std::uint32_t d = group.first_dimension();

@@ -20,6 +20,9 @@ struct VertexContext {
   const float* roughness = nullptr;         ///< 0 delta ... 1 diffuse
   const std::uint8_t* kind = nullptr;       ///< SurfaceKind
   const std::uint32_t* material = nullptr;  ///< index of the BSDF in the scene
+
+  /// The same without its first `count` entries.
+  VertexContext from(std::size_t count) const;
 };
 
 /// The one door: every random number inside the tracer comes from here, a group at a time, for a whole batch of paths,

@@ -49,40 +49,65 @@ void PixelMoments::add(std::uint32_t pixel, const Color& value) {
   }
 }
 
-std::vector<std::uint32_t> PixelMoments::allocate(int spp, Objective objective, double u) const {
-  const std::size_t pixels = m_moments.size();
+PixelMoments& PixelMoments::operator+=(const PixelMoments& other) {
+  for (std::size_t p = 0; p < m_moments.size(); ++p) {
+    m_moments[p].n += other.m_moments[p].n;
+    for (int c = 0; c < 3; ++c) {
+      m_moments[p].sum[c] += other.m_moments[p].sum[c];
+      m_moments[p].square[c] += other.m_moments[p].square[c];
+    }
+  }
+  return *this;
+}
+
+std::vector<double> PixelMoments::deviations(Objective objective, const PixelMoments& means) const {
   struct Pooled {
-    double n = 0, sum[3]{}, spread[3]{};  // spread: n times the variance of one sample
+    double n = 0, spread[3]{};  // spread: n times the variance of one sample
+    double mean_n = 0, sum[3]{};
     Pooled& operator+=(const Pooled& o) {
-      n += o.n;
-      for (int c = 0; c < 3; ++c) sum[c] += o.sum[c], spread[c] += o.spread[c];
+      n += o.n, mean_n += o.mean_n;
+      for (int c = 0; c < 3; ++c) spread[c] += o.spread[c], sum[c] += o.sum[c];
       return *this;
     }
   };
-  std::vector<Pooled> pooled(pixels);
-  for (std::size_t p = 0; p < pixels; ++p) {
-    const Moments& m = m_moments[p];
+  std::vector<Pooled> pooled(m_moments.size());
+  for (std::size_t p = 0; p < pooled.size(); ++p) {
+    const Moments &m = m_moments[p], &of_mean = means.m_moments[p];
+    pooled[p].mean_n = of_mean.n;
+    std::copy_n(of_mean.sum, 3, pooled[p].sum);
     if (m.n < 2) continue;
     pooled[p].n = m.n;
-    for (int c = 0; c < 3; ++c) {
-      pooled[p].sum[c] = m.sum[c];
+    for (int c = 0; c < 3; ++c)
       pooled[p].spread[c] = std::max(0.0, m.square[c] - m.sum[c] * m.sum[c] / m.n) * m.n / (m.n - 1);
-    }
   }
   pool(pooled, m_width, m_height);
-  // Standard deviation of one sample, over what the error divides by.
-  const auto deviation = [objective](const Pooled& p) {
-    if (p.n == 0) return 0.0;
+  std::vector<double> deviations(pooled.size());
+  for (std::size_t p = 0; p < pooled.size(); ++p) {
+    const Pooled& around = pooled[p];
+    if (around.n == 0) continue;
     double error = 0;
-    for (int c = 0; c < 3; ++c)
-      error += p.spread[c] / p.n /
-               (objective == Objective::relmse ? (p.sum[c] / p.n) * (p.sum[c] / p.n) + kRelativeFloor : 1);
-    return std::sqrt(error);
-  };
+    for (int c = 0; c < 3; ++c) {
+      const double mean = around.sum[c] / around.mean_n;
+      error += around.spread[c] / around.n / (objective == Objective::relmse ? mean * mean + kRelativeFloor : 1);
+    }
+    deviations[p] = std::sqrt(error / 3);
+  }
+  return deviations;
+}
 
-  std::vector<double> want(pixels);
+double PixelMoments::error(std::optional<Objective> objective, const PixelMoments& means) const {
+  double sum = 0, square = 0;
+  const std::vector<double> deviation = deviations(objective.value_or(Objective::relmse), means);
+  for (const double d : deviation) sum += d, square += d * d;
+  const auto pixels = static_cast<double>(deviation.size());
+  return objective ? (sum / pixels) * (sum / pixels) : square / pixels;
+}
+
+std::vector<std::uint32_t> PixelMoments::allocate(int spp, Objective objective, double u) const {
+  const std::size_t pixels = m_moments.size();
+  std::vector<double> want = deviations(objective, *this);
   double sum = 0;
-  for (std::size_t p = 0; p < pixels; ++p) sum += want[p] = deviation(pooled[p]);
+  for (const double w : want) sum += w;
   const double mean = sum / static_cast<double>(pixels);
   double capped = 0;
   for (double& w : want) capped += w = mean > 0 ? std::min(w / mean, kMost) : 1;

@@ -24,11 +24,18 @@ class PixelMoments {
   /// Counts go with the standard deviation of a pixel's samples, over what the error divides by (Neyman 1934, optimal
   /// allocation). They do not bias the image if each pass weighs the same in every pixel.
   std::vector<std::uint32_t> allocate(int spp, Objective objective, double u) const;
+  /// The error that one sample per pixel on average would have: with the best allocation for the objective, or, without
+  /// one, relMSE with as many in every pixel. What relMSE divides by is taken from `means`.
+  double error(std::optional<Objective> objective, const PixelMoments& means) const;
+  PixelMoments& operator+=(const PixelMoments& other);
 
  private:
   struct Moments {
     double n = 0, sum[3]{}, square[3]{};
   };
+  /// For each pixel the standard deviation of one sample over what the error divides by, pooled over its neighbours.
+  std::vector<double> deviations(Objective objective, const PixelMoments& means) const;
+
   int m_width, m_height;
   std::vector<Moments> m_moments;
 };

@@ -108,7 +108,9 @@ void ImageEstimator::add_guided_pass(int spp, const Guidance& guidance, const Pr
   WARPATH_CHECK(!m_joint && !(m_proposal && guidance.warp));
   add_emission_pass(spp, stop);
   if (!m_moments) m_moments.emplace(m_film.width(), m_film.height());
+  m_pass_moments.emplace(m_film.width(), m_film.height());
   add_paths(spp, guidance, progress, stop);
+  *m_moments += *m_pass_moments;
 }
 
 void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress& progress,
@@ -208,8 +210,8 @@ void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress
   const auto merge = [&](Job& job, std::size_t batch) {
     const auto begin = Clock::now();
     add_to_film(m_film, film, job.results, job.ids.size(), job.weight);
-    if (m_moments)
-      for (std::size_t i = 0; i < job.pixels.size(); ++i) m_moments->add(job.pixels[i], job.results.radiance[i]);
+    if (m_pass_moments)
+      for (std::size_t i = 0; i < job.pixels.size(); ++i) m_pass_moments->add(job.pixels[i], job.results.radiance[i]);
     if (job.recorder) guidance.learner->merge(*job.recorder);
     m_cost.samples += job.ids.size();
     warp_seconds += job.warp_seconds;

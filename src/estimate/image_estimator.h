@@ -48,8 +48,8 @@ class ImageEstimator {
   /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
-  /// The same with guidance, for a stratified film; with a warp of vertices the proposal must be null. Every pass weighs by its samples per pixel, the same in every
-  /// pixel, so samples may be placed by what earlier ones found.
+  /// The same with guidance, for a stratified film; with a warp of vertices the proposal must be null. Every pass
+  /// weighs by its samples per pixel, the same in every pixel, so samples may be placed by what earlier ones found.
   void add_guided_pass(int spp, const Guidance& guidance, const Progress& progress = {},
                        const std::function<bool()>& stop = {});
 
@@ -65,6 +65,9 @@ class ImageEstimator {
   ImageEstimate develop_emission() const;  ///< directly seen emission alone
   double spp() const;                      ///< samples per pixel so far
   std::uint64_t non_finite() const;
+  /// Of the last guided pass, and of all of them. There must have been one.
+  const PixelMoments& pass_moments() const { return *m_pass_moments; }
+  const PixelMoments& moments() const { return *m_moments; }
   const RenderCost& cost() const { return m_cost; }
 
  private:
@@ -79,9 +82,9 @@ class ImageEstimator {
   std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
   Film m_film;
   std::optional<Film> m_emission, m_uniform;
-  std::optional<PixelMoments> m_moments;  // of guided passes
-  std::vector<std::uint32_t> m_begun;     // samples begun so far in each pixel: numbers them; not of a warped film
-  int m_passes_spp = 0;                   // samples per pixel begun so far on average
+  std::optional<PixelMoments> m_moments, m_pass_moments;  // of all guided passes, and of the last
+  std::vector<std::uint32_t> m_begun;  // samples begun so far in each pixel: numbers them; not of a warped film
+  int m_passes_spp = 0;                // samples per pixel begun so far on average
   std::uint64_t m_emission_rays = 0;
   RenderCost m_cost;
 };

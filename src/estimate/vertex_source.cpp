@@ -6,6 +6,24 @@
 
 namespace warpath {
 
+void VertexSource::locate(std::uint16_t bounce, std::span<const std::uint32_t> lanes, const VertexContext& context) {
+  auto& [z, y, places, place_of_lane, located] = m_scratch;
+  places.resize(std::max(places.size(), lanes.size()));
+  // Vertices that sample lights come first and are most of them; mirrors and glass may be left.
+  const auto is_known = [&](std::uint32_t lane) { return located[lane] == bounce; };
+  if (std::any_of(lanes.begin(), lanes.end(), is_known)) {
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      const std::uint32_t lane = lanes[i];
+      if (!is_known(lane)) m_warp.locate(context.from(i), 1, &place_of_lane[lane]);
+      places[i] = place_of_lane[lane];
+    }
+  } else {
+    m_warp.locate(context, lanes.size(), places.data());
+    for (std::size_t i = 0; i < lanes.size(); ++i) place_of_lane[lanes[i]] = places[i];
+  }
+  for (const std::uint32_t lane : lanes) located[lane] = bounce;
+}
+
 void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
                                 const VertexContext& context, float* inv_q) {
   const std::size_t n = lanes.size();
@@ -16,8 +34,9 @@ void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<cons
     const std::uint64_t key = sample_key(m_seed, m_ids[lanes[i]]);
     for (std::uint32_t a = 0; a < 3; ++a) m_scratch.z[a][i] = sample_double(key, d + a);
   }
-  const auto& [z, y] = m_scratch;
-  m_warp.sample(which, context, n, {z[0].data(), z[1].data(), z[2].data()},
+  const auto& z = m_scratch.z;
+  locate(first.bounce, lanes, context);
+  m_warp.sample(which, context, m_scratch.places.data(), n, {z[0].data(), z[1].data(), z[2].data()},
                 {m_scratch.y[0].data(), m_scratch.y[1].data(), m_scratch.y[2].data()}, inv_q);
   m_drawn = first;
 }

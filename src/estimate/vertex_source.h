@@ -13,6 +13,8 @@ namespace warpath {
 struct VertexSourceScratch {
   std::array<std::vector<double>, 3> z;
   std::array<std::vector<float>, 3> y;
+  std::vector<std::uint32_t> places, place_of_lane;
+  std::vector<std::uint16_t> located;  // lane -> bounce at which it was located last
 };
 
 /// From a warp that lives at vertices to the numbers of a path: film positions as they are given, the numbers of each
@@ -29,13 +31,18 @@ class VertexSource final : public UniformSource {
         m_warp(warp),
         m_film_x(film_x),
         m_film_y(film_y),
-        m_scratch(scratch) {}
+        m_scratch(scratch) {
+    scratch.place_of_lane.resize(ids.size());
+    scratch.located.assign(ids.size(), 0);
+  }
 
   bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
             float* inv_q) override;
   bool wants_context() const override { return true; }
 
  private:
+  /// The places of vertices, into m_scratch.places; those that were located at this bounce before are known.
+  void locate(std::uint16_t bounce, std::span<const std::uint32_t> lanes, const VertexContext& context);
   /// Draws three numbers for each lane into m_scratch.y; `first` is the first of the two groups that hold them.
   void draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
                     const VertexContext& context, float* inv_q);

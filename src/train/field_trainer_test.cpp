@@ -77,12 +77,11 @@ std::shared_ptr<const Field> taught(const FieldSettings& settings, int batches) 
 
 /// q of numbers at one of the vertices of a batch.
 float density(const Field& field, VertexNumbers which, const Batch& batch, std::size_t i, std::array<float, 3> y) {
-  VertexContext c = batch.context();
-  for (auto* array : {&c.position, &c.normal, &c.wi})
-    for (const float*& values : *array) values += i;
-  c.kind += i, c.material += i;
+  const VertexContext context = batch.context().from(i);
+  std::uint32_t place;
+  field.locate(context, 1, &place);
   float inv_q;
-  field.inverse_density(which, c, 1, {&y[0], &y[1], &y[2]}, &inv_q);
+  field.inverse_density(which, context, &place, 1, {&y[0], &y[1], &y[2]}, &inv_q);
   return 1 / inv_q;
 }
 

@@ -51,33 +51,45 @@ const HalfProbability* Field::density(VertexNumbers which, std::uint32_t cell) c
                                        : m_scatter.data() + cell * m_grids.diffuse.stored();
 }
 
-void Field::sample(VertexNumbers which, const VertexContext& context, std::size_t n,
+void Field::locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const {
+  m_tree.find_cells(context, n, places);
+}
+
+void Field::sample(VertexNumbers which, const VertexContext&, const std::uint32_t* places, std::size_t n,
                    const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const {
-  // Cells lie all over memory, so they are asked for a while before their turn.
-  constexpr std::size_t kAhead = 8;
-  std::array<std::uint32_t, kAhead> cells;
-  const auto find = [&](std::size_t i) {
-    const std::uint32_t cell = m_tree.cell(FieldTree::root_key(context, i), FieldTree::features(context, i));
-    if (cell != FieldTree::kNoCell) __builtin_prefetch(density(which, cell));
-    cells[i % kAhead] = cell;
-  };
-  for (std::size_t i = 0; i < std::min(n, kAhead); ++i) find(i);
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::uint32_t cell = cells[i % kAhead];
-    if (i + kAhead < n) find(i + kAhead);
-    const std::array<double, 3> latent{z[0][i], z[1][i], z[2][i]};
-    std::array<float, 3> drawn{to_primary(latent[0]), to_primary(latent[1]), to_primary(latent[2])};
-    inv_q[i] = 1;
-    if (cell != FieldTree::kNoCell)
-      inv_q[i] = m_grids.grid(which, m_kinds[cell]).sample(density(which, cell), latent, drawn);
-    for (std::size_t a = 0; a < 3; ++a) y[a][i] = drawn[a];
+  constexpr std::size_t kBlock = 32;
+  std::array<HalvingGrid::Walk, kBlock> walks;
+  std::array<std::size_t, kBlock> vertex;
+  for (std::size_t first = 0; first < n; first += kBlock) {
+    const std::size_t end = std::min(n, first + kBlock);
+    std::size_t count = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      const std::uint32_t cell = places[i];
+      if (cell == FieldTree::kNoCell) {
+        for (std::size_t a = 0; a < 3; ++a) y[a][i] = to_primary(z[a][i]);
+        inv_q[i] = 1;
+        continue;
+      }
+      walks[count].start(m_grids.grid(which, m_kinds[cell]), density(which, cell), {z[0][i], z[1][i], z[2][i]});
+      vertex[count++] = i;
+    }
+    for (bool more = count > 0; more;) {
+      more = false;
+      for (std::size_t k = 0; k < count; ++k) more |= walks[k].step();
+    }
+    std::array<float, 3> drawn;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = vertex[k];
+      inv_q[i] = walks[k].finish(drawn);
+      for (std::size_t a = 0; a < 3; ++a) y[a][i] = drawn[a];
+    }
   }
 }
 
-void Field::inverse_density(VertexNumbers which, const VertexContext& context, std::size_t n,
+void Field::inverse_density(VertexNumbers which, const VertexContext&, const std::uint32_t* places, std::size_t n,
                             const std::array<const float*, 3>& y, float* inv_q) const {
   for (std::size_t i = 0; i < n; ++i) {
-    const std::uint32_t cell = m_tree.cell(FieldTree::root_key(context, i), FieldTree::features(context, i));
+    const std::uint32_t cell = places[i];
     inv_q[i] = 1;
     if (cell == FieldTree::kNoCell) continue;
     const HalvingGrid& grid = m_grids.grid(which, m_kinds[cell]);

@@ -31,9 +31,11 @@ class Field final : public VertexWarp {
         std::vector<HalfProbability> scatter);
 
   std::string family() const override { return "field"; }
-  void sample(VertexNumbers which, const VertexContext& context, std::size_t n, const std::array<const double*, 3>& z,
-              const std::array<float*, 3>& y, float* inv_q) const override;
-  void inverse_density(VertexNumbers which, const VertexContext& context, std::size_t n,
+  /// A place is a cell.
+  void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;
+  void sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
+              const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override;
+  void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                        const std::array<const float*, 3>& y, float* inv_q) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
   /// Throws FileError.

@@ -87,12 +87,17 @@ Drawn draw(const Field& field, VertexNumbers which, const Vertices& vertices) {
     drawn.y[a].resize(kVertices);
     for (std::size_t i = 0; i < kVertices; ++i) z[a].push_back(sample_double(sample_key(17, i), a));
   }
+  std::vector<std::uint32_t> places(kVertices);
+  field.locate(vertices.view(), kVertices, places.data());
+  for (std::size_t i = 0; i < kVertices; ++i)
+    EXPECT_EQ(places[i],
+              field.tree().cell(FieldTree::root_key(vertices.view(), i), FieldTree::features(vertices.view(), i)));
   drawn.inv_q.resize(kVertices);
   drawn.inv_q_again.resize(kVertices);
-  field.sample(which, vertices.view(), kVertices, {z[0].data(), z[1].data(), z[2].data()},
+  field.sample(which, vertices.view(), places.data(), kVertices, {z[0].data(), z[1].data(), z[2].data()},
                {drawn.y[0].data(), drawn.y[1].data(), drawn.y[2].data()}, drawn.inv_q.data());
-  field.inverse_density(which, vertices.view(), kVertices, {drawn.y[0].data(), drawn.y[1].data(), drawn.y[2].data()},
-                        drawn.inv_q_again.data());
+  field.inverse_density(which, vertices.view(), places.data(), kVertices,
+                        {drawn.y[0].data(), drawn.y[1].data(), drawn.y[2].data()}, drawn.inv_q_again.data());
   return drawn;
 }
 

@@ -1,5 +1,6 @@
 #include "warp/field_tree.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace warpath {
@@ -16,6 +17,37 @@ std::uint32_t FieldTree::root_key(const VertexContext& context, std::size_t i) {
 FieldTree::Features FieldTree::features(const VertexContext& context, std::size_t i) {
   return {context.position[0][i], context.position[1][i], context.position[2][i],
           context.wi[0][i],       context.wi[1][i],       context.wi[2][i]};
+}
+
+void FieldTree::find_cells(const VertexContext& context, std::size_t n, std::uint32_t* cells) const {
+  constexpr std::size_t kBlock = 16;
+  std::array<Features, kBlock> at;
+  std::array<std::uint32_t, kBlock> node, open;  // open: those that are not at a leaf yet
+  for (std::size_t first = 0; first < n; first += kBlock) {
+    const std::size_t count = std::min(n - first, kBlock);
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t key = root_key(context, first + k);
+      at[k] = features(context, first + k);
+      node[k] = key < m_roots.size() ? m_roots[key] : kNoCell;
+      cells[first + k] = kNoCell;
+      if (node[k] != kNoCell) open[left++] = static_cast<std::uint32_t>(k);
+    }
+    while (left > 0) {
+      std::size_t kept = 0;
+      for (std::size_t o = 0; o < left; ++o) {
+        const std::uint32_t k = open[o];
+        const Node& here = m_nodes[node[k]];
+        if (here.feature == kLeaf) {
+          cells[first + k] = here.next;
+          continue;
+        }
+        node[k] = here.next + (at[k][here.feature] >= here.split);
+        open[kept++] = k;
+      }
+      left = kept;
+    }
+  }
 }
 
 std::uint32_t FieldTree::add_root(std::uint32_t root_key) {

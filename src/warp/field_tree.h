@@ -28,6 +28,8 @@ class FieldTree {
     while (node->feature != kLeaf) node = &m_nodes[node->next + (at[node->feature] >= node->split)];
     return node->next;
   }
+  /// The same for n vertices, several at a time: each waits for memory while the others go on.
+  void find_cells(const VertexContext& context, std::size_t n, std::uint32_t* cells) const;
   std::uint32_t cells() const { return m_cells; }
 
   /// A new tree of one cell, which is returned.

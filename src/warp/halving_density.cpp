@@ -12,15 +12,17 @@ namespace {
 constexpr int kSubtreeLevels = 4;
 constexpr std::uint32_t kSubtree = 1u << kSubtreeLevels;  // numbers of a subtree, the first of which is not used
 
+/// Subtree s has the children 16 s + 1 ... 16 s + 16.
+constexpr std::uint32_t child(std::uint32_t subtree, std::uint32_t leaf) { return subtree * kSubtree + 1 + leaf; }
+
 /// Walks down the tree of halvings and knows where the probability of the node it stands on is stored.
-class Walk {
+class Descent {
  public:
   std::size_t place() const { return m_subtree * kSubtree + m_node; }
   void go(bool second) {
     m_node = 2 * m_node + second;
     if (m_node < kSubtree) return;
-    // Subtree s has the children 16 s + 1 ... 16 s + 16.
-    m_subtree = m_subtree * kSubtree + 1 + (m_node - kSubtree);
+    m_subtree = child(m_subtree, m_node - kSubtree);
     m_node = 1;
   }
 
@@ -81,7 +83,7 @@ void HalvingGrid::set_density(std::span<const float> masses, HalfProbability* de
   std::fill_n(density, m_stored, HalfProbability{0});
   for (int level = 0; level < m_levels; ++level)
     for (std::uint32_t node = 1u << level; node < 2u << level; ++node) {
-      Walk walk;
+      Descent walk;
       for (int k = level - 1; k >= 0; --k) walk.go(node >> k & 1);
       const double first = mass[2 * node], second = mass[2 * node + 1];
       int p = kWholeProbability / 2;
@@ -93,37 +95,62 @@ void HalvingGrid::set_density(std::span<const float> masses, HalfProbability* de
     }
 }
 
+void HalvingGrid::Walk::start(const HalvingGrid& grid, const HalfProbability* density, const std::array<double, 3>& z) {
+  m_grid = &grid;
+  m_density = density;
+  m_offset = z;
+  m_width = {1, 1, 1};
+  m_place = {};
+  m_subtree = 0;
+  m_level = 0;
+  __builtin_prefetch(density);
+}
+
+bool HalvingGrid::Walk::step() {
+  const HalfProbability* subtree = m_density + m_subtree * kSubtree;
+  const int end = std::min(m_level + kSubtreeLevels, m_grid->m_levels);
+  std::uint32_t node = 1;
+  for (; m_level < end; ++m_level) {
+    const std::size_t a = m_grid->m_axis[static_cast<std::size_t>(m_level)];
+    const int p = subtree[node];
+    const double first = p * (1.0 / kWholeProbability) * m_width[a];
+    // A whole leaves no second half, whatever rounding did to the offset. No branches: they could not be predicted.
+    const bool second = (m_offset[a] >= first) & (p < kWholeProbability);
+    const double is_second = second;
+    m_offset[a] -= is_second * first;
+    m_width[a] = first + is_second * (m_width[a] - 2 * first);
+    m_place[a] = 2 * m_place[a] + second;
+    node = 2 * node + second;
+  }
+  if (m_level == m_grid->m_levels) return false;
+  m_subtree = child(m_subtree, node - kSubtree);
+  __builtin_prefetch(m_density + m_subtree * kSubtree);
+  return true;
+}
+
+float HalvingGrid::Walk::finish(std::array<float, 3>& y) const {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double within = m_width[a] > 0 ? std::min(m_offset[a] / m_width[a], 1.0) : 0.5, unit = m_grid->m_unit[a];
+    // The last float below the bin's end: the sample must not leave the bin whose density it is divided by.
+    const float begin = static_cast<float>(m_place[a] * unit);
+    const float end = static_cast<float>((m_place[a] + 1) * unit);
+    y[a] = std::clamp(static_cast<float>((m_place[a] + within) * unit), begin, below(end));
+  }
+  return static_cast<float>(m_grid->m_volume / (m_width[0] * m_width[1] * m_width[2]));
+}
+
 float HalvingGrid::sample(const HalfProbability* density, const std::array<double, 3>& z,
                           std::array<float, 3>& y) const {
-  // Instead of stretching z to [0,1) after each halving, `width` keeps track of how wide its range has become.
-  std::array<double, 3> offset = z, width{1, 1, 1};
-  std::array<std::uint32_t, 3> place{};
   Walk walk;
-  for (int level = 0; level < m_levels; ++level) {
-    const std::size_t a = m_axis[static_cast<std::size_t>(level)];
-    const int p = density[walk.place()];
-    const double first = p * (1.0 / kWholeProbability) * width[a];
-    // A whole leaves no second half, whatever rounding did to the offset. No branches: they could not be predicted.
-    const bool second = (offset[a] >= first) & (p < kWholeProbability);
-    const double is_second = second;
-    offset[a] -= is_second * first;
-    width[a] = first + is_second * (width[a] - 2 * first);
-    place[a] = 2 * place[a] + second;
-    walk.go(second);
+  walk.start(*this, density, z);
+  while (walk.step()) {
   }
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double within = width[a] > 0 ? std::min(offset[a] / width[a], 1.0) : 0.5;
-    // The last float below the bin's end: the sample must not leave the bin whose density it is divided by.
-    const float begin = static_cast<float>(place[a] * m_unit[a]);
-    const float end = static_cast<float>((place[a] + 1) * m_unit[a]);
-    y[a] = std::clamp(static_cast<float>((place[a] + within) * m_unit[a]), begin, below(end));
-  }
-  return static_cast<float>(m_volume / (width[0] * width[1] * width[2]));
+  return walk.finish(y);
 }
 
 float HalvingGrid::inverse_density(const HalfProbability* density, std::uint32_t bin) const {
   double q = 1;
-  Walk walk;
+  Descent walk;
   for (int level = m_levels - 1; level >= 0; --level) {
     const bool second = bin >> level & 1;
     const double p = density[walk.place()] * (1.0 / kWholeProbability);

@@ -35,7 +35,27 @@ class HalvingGrid {
   /// mass keep some.
   void set_density(std::span<const float> masses, HalfProbability* density) const;
 
-  /// y = the point that the density sends the latent z to; returns 1 / q(y).
+  /// One sample on its way from a latent through the tree of halvings, a subtree at a time: between two steps the
+  /// memory of the next one is on its way, so that many samples that take turns do not wait for it.
+  class Walk {
+   public:
+    /// Both must outlive the walk.
+    void start(const HalvingGrid& grid, const HalfProbability* density, const std::array<double, 3>& z);
+    /// Goes on by one subtree; false when there is no further one.
+    bool step();
+    /// After the last step: y = the point that the density sends the latent to; returns 1 / q(y).
+    float finish(std::array<float, 3>& y) const;
+
+   private:
+    const HalvingGrid* m_grid;
+    const HalfProbability* m_density;
+    // Instead of stretching the latent to [0,1) after each halving, `width` keeps track of how wide its range is.
+    std::array<double, 3> m_offset, m_width;
+    std::array<std::uint32_t, 3> m_place;
+    std::uint32_t m_subtree;
+    int m_level;
+  };
+  /// One sample from start to finish.
   float sample(const HalfProbability* density, const std::array<double, 3>& z, std::array<float, 3>& y) const;
   /// 1 / q in a bin.
   float inverse_density(const HalfProbability* density, std::uint32_t bin) const;

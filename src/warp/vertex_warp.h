@@ -20,13 +20,15 @@ class VertexWarp {
  public:
   virtual ~VertexWarp() = default;
   virtual std::string family() const = 0;
-  /// Draws the numbers of n vertices. z: three arrays of n uniform latents in [0,1); y: three arrays of n numbers in
-  /// [0,1); inv_q: n, 1 / q of the y that were handed out, given the context.
-  virtual void sample(VertexNumbers which, const VertexContext& context, std::size_t n,
+  /// What the warp finds out about n vertices once, for all the numbers that are drawn there.
+  virtual void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const = 0;
+  /// Draws the numbers of n vertices, located before. z: three arrays of n uniform latents in [0,1); y: three arrays of
+  /// n numbers in [0,1); inv_q: n, 1 / q of the y that were handed out, given the context.
+  virtual void sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                       const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const = 0;
   /// inv_q[i] = 1 / q(y[i] | context[i]).
-  virtual void inverse_density(VertexNumbers which, const VertexContext& context, std::size_t n,
-                               const std::array<const float*, 3>& y, float* inv_q) const = 0;
+  virtual void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places,
+                               std::size_t n, const std::array<const float*, 3>& y, float* inv_q) const = 0;
   /// Puts tensors and metadata under names that start with `prefix`.
   virtual void save(TensorFile& file, const std::string& prefix) const = 0;
 };
