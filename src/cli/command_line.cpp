@@ -125,6 +125,11 @@ void add_options(CLI::App& app, RenderOptions& options) {
          "many in every pixel; `none` has them even")
       ->capture_default_str()
       ->check(CLI::IsMember({"mse", "relmse", "even"}));
+  app.add_option(
+         "--sampler", options.sampler_name,
+         "How the numbers of a pixel's samples are spread, where the film is not warped: independent, stratified "
+         "or sobol [independent]")
+      ->check(CLI::IsMember({"independent", "stratified", "sobol"}));
   app.add_option("--crop", options.crop, "Part of the film to render")->type_name("X,Y,W,H");
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <tuple>
 
 #include "cli/terminal.h"
 #include "core/interrupt.h"
@@ -57,6 +58,18 @@ Reference as_reference(const ImageEstimate& estimate) {
   return reference;
 }
 
+/// MSE and relMSE that the image's own variance promises.
+std::pair<double, double> predicted_errors(const ImageEstimate& image, const ImageRgb& reference) {
+  double mse = 0, relmse = 0;
+  for (std::size_t p = 0; p < image.mean.size(); ++p)
+    for (int c = 0; c < 3; ++c) {
+      mse += image.variance[p][c];
+      relmse += image.variance[p][c] / (sqr(reference.pixels[p][c]) + 0.01);
+    }
+  const double count = 3 * static_cast<double>(image.mean.size());
+  return {mse / count, relmse / count};
+}
+
 }  // namespace
 
 ComparisonRunner::ComparisonRunner(std::shared_ptr<const Tracer> tracer, CompareCommand command,
@@ -76,6 +89,7 @@ void ComparisonRunner::run(int threads) {
   c.height = scene.film.crop_height;
   c.threads = threads;
   c.seed = m_command.common.seed;
+  c.settings["sampler"] = m_command.render.sampler_name.value_or("independent");
   c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
 
   prepare_reference();
@@ -83,6 +97,7 @@ void ComparisonRunner::run(int threads) {
   c.reference = m_reference.path.string();
   c.reference_has_variance = m_reference.variance.has_value();
 
+  for (const Method& method : m_methods) m_command.render.sampler(method.layout);  // throws before any work
   for (int run = 0; run < m_command.runs && !g_interrupted; ++run)
     for (const Method& method : m_methods) {
       if (g_interrupted) break;
@@ -163,7 +178,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
         static_cast<double>(target.size());
   }
 
-  ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed);
+  ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed, m_command.render.sampler(method.layout));
   {
     prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
@@ -190,6 +205,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const ImageEstimate image = estimator.develop();
   const ImageRgb rest = image_rgb(estimator.develop_rest());
   result.set_errors(image_errors(image_rgb(image), m_reference));
+  std::tie(result.mse_predicted, result.relmse_predicted) = predicted_errors(image, m_reference.image);
   const ImageErrors rest_errors = image_errors(rest, m_reference_rest);
   result.mse_rest = rest_errors.mse;
   result.relmse_rest = rest_errors.relmse;

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "core/latents.h"
 #include "estimate/allocation.h"
+#include "warpath/layout.h"
 #include "warpath/train.h"
 
 namespace warpath {
@@ -49,11 +51,14 @@ struct TrainingOptions {
 struct RenderOptions {
   std::optional<int> spp;
   std::optional<double> time;
-  std::string crop;                       ///< X,Y,W,H
-  std::string aov;                        ///< albedo,normal,depth
-  std::string objective_name = "relmse";  ///< mse, relmse or even
+  std::string crop;                         ///< X,Y,W,H
+  std::string aov;                          ///< albedo,normal,depth
+  std::string objective_name = "relmse";    ///< mse, relmse or even
+  std::optional<std::string> sampler_name;  ///< independent, stratified or sobol
 
   std::optional<Objective> objective() const;  ///< none for `even`
+  /// The sampler of a method with this layout. Throws ConfigError if what was asked for does not go with it.
+  Sampler sampler(const Layout& layout) const;
 };
 
 /// Loads the scene as the options ask for it; crop is applied to its film.

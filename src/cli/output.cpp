@@ -71,6 +71,7 @@ void describe(ImageFile& file, const Tracer& tracer, const Method& method, const
   attributes["warpath:scene"] = tracer.scene().file.filename().string();
   attributes["warpath:method"] = method.name;
   attributes["warpath:dims"] = method.layout.name();
+  attributes["warpath:sampler"] = std::string(sampler_name(estimator.sampler()));
   attributes["warpath:seed"] = std::to_string(common.seed);
   attributes["warpath:spp"] = static_cast<float>(estimator.spp());
   attributes["warpath:max_depth"] = tracer.scene().integrator.max_depth;

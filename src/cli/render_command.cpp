@@ -15,6 +15,7 @@ void run(const RenderCommand& command) {
   const Threads threads(common);
   check_image_name(command.output);
   const Method method = parse_method(command.warp);
+  const Sampler sampler = command.render.sampler(method.layout);
   const std::vector<Aov> aovs = parse_aovs(command.render.aov);
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, &command.render));
   const Budget budget = make_budget(command.render, tracer->scene().sample_count);
@@ -24,7 +25,7 @@ void run(const RenderCommand& command) {
   MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
                         command.render.objective(), common.quiet);
   PreparedMethod prepared = trainer.prepare(method);
-  ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed);
+  ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed, sampler);
   {
     prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);

@@ -18,9 +18,8 @@ VertexContext VertexContext::from(std::size_t count) const {
 bool UniformSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext*, float* u0, float* u1,
                          float*) {
   const std::uint32_t d = group.first_dimension();
-  for (std::size_t i = 0; i < lanes.size(); ++i) u0[i] = sample_float(sample_key(m_seed, m_ids[lanes[i]]), d);
-  if (u1)
-    for (std::size_t i = 0; i < lanes.size(); ++i) u1[i] = sample_float(sample_key(m_seed, m_ids[lanes[i]]), d + 1);
+  m_latents.fill(d, lanes, u0);
+  if (u1) m_latents.fill(d + 1, lanes, u1);
   return false;
 }
 

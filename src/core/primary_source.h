@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/latents.h"
 #include "warpath/layout.h"
 
 namespace warpath {
@@ -41,17 +42,24 @@ class PrimarySource {
   virtual bool wants_context() const { return false; }
 };
 
-/// Uniform numbers from the counter-based streams of the samples `ids`.
+/// Uniform numbers, as latents give them.
 class UniformSource : public PrimarySource {
  public:
-  /// seed and ids name the samples; lane i is sample ids[i].
-  UniformSource(std::uint64_t seed, std::span<const std::uint64_t> ids) : m_seed(seed), m_ids(ids) {}
+  /// Independent numbers: seed and ids name the samples; lane i is sample ids[i].
+  UniformSource(std::uint64_t seed, std::span<const std::uint64_t> ids) : m_own(seed, ids), m_latents(m_own) {}
+  /// A view: not copied.
+  explicit UniformSource(const Latents& latents) : m_latents(latents) {}
+  UniformSource(const UniformSource&) = delete;
+  UniformSource& operator=(const UniformSource&) = delete;
   bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
             float* inv_q) override;
 
+ protected:
+  const Latents& latents() const { return m_latents; }
+
  private:
-  std::uint64_t m_seed;
-  std::span<const std::uint64_t> m_ids;
+  Latents m_own;  // empty if they are another's
+  const Latents& m_latents;
 };
 
 /// Hands out a given y for the groups of a layout, and uniform numbers for all others: inv_q is 1 throughout. With it
@@ -62,6 +70,8 @@ class FixedSource final : public UniformSource {
   FixedSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const Layout& layout, const double* y,
               std::size_t stride)
       : UniformSource(seed, ids), m_layout(layout), m_y(y), m_stride(stride) {}
+  FixedSource(const Latents& latents, const Layout& layout, const double* y, std::size_t stride)
+      : UniformSource(latents), m_layout(layout), m_y(y), m_stride(stride) {}
   bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
             float* inv_q) override;
 

@@ -7,20 +7,41 @@
 
 namespace warpath {
 
-Film::Film(const FilmSettings& settings, Weights weights)
+Film::Film(const FilmSettings& settings, Weights weights, Errors errors)
     : m_width(settings.crop_width),
       m_height(settings.crop_height),
       m_filter(settings.filter),
       m_weights(weights),
+      m_errors(errors),
       m_sums(static_cast<std::size_t>(m_width) * static_cast<std::size_t>(m_height)),
       m_integral_x(filter_integrals(settings.filter, m_width)),
       m_integral_y(filter_integrals(settings.filter, m_height)) {
   const auto taps = static_cast<std::size_t>(2 * std::ceil(m_filter.radius) + 2);
-  m_weight_x.resize(taps);
-  m_weight_y.resize(taps);
+  for (Splat* splat : {&m_splat, &m_other}) {
+    splat->x.resize(taps);
+    splat->y.resize(taps);
+  }
+  if (m_errors == Errors::replicates) m_replicates.resize(m_sums.size() * kReplicates);
 }
 
-void Film::add(float x, float y, const Color& value, float weight) {
+void Film::place(float x, float y, float weight, Splat& splat) const {
+  const int own_x = std::min(static_cast<int>(x), m_width - 1), own_y = std::min(static_cast<int>(y), m_height - 1);
+  // The box of one pixel takes the sample's own pixel, so that none on a border counts twice.
+  const bool own_only = m_filter.type == ReconstructionFilter::Type::box && m_filter.radius <= 0.5f;
+  const float r = m_filter.radius;
+  splat.x0 = own_only ? own_x : std::max(0, static_cast<int>(std::ceil(x - 0.5f - r)));
+  splat.y0 = own_only ? own_y : std::max(0, static_cast<int>(std::ceil(y - 0.5f - r)));
+  splat.x1 = own_only ? own_x : std::min(m_width - 1, static_cast<int>(std::floor(x - 0.5f + r)));
+  splat.y1 = own_only ? own_y : std::min(m_height - 1, static_cast<int>(std::floor(y - 0.5f + r)));
+  for (int i = splat.x0; i <= splat.x1; ++i)
+    splat.x[static_cast<std::size_t>(i - splat.x0)] =
+        own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(i) + 0.5f - x);
+  for (int j = splat.y0; j <= splat.y1; ++j)
+    splat.y[static_cast<std::size_t>(j - splat.y0)] =
+        weight * (own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(j) + 0.5f - y));
+}
+
+void Film::add(float x, float y, const Color& value, float weight, std::uint32_t replicate) {
   ++m_samples;
   Color f = value;
   if (!std::isfinite(f.x + f.y + f.z)) {
@@ -32,31 +53,41 @@ void Film::add(float x, float y, const Color& value, float weight) {
   // A black sample changes nothing where the divisor is known beforehand.
   if (m_weights == Weights::expected && f == Color(0.0f)) return;
 
-  // The box of one pixel takes the sample's own pixel, so that none on a border counts twice.
-  const bool own_only = m_filter.type == ReconstructionFilter::Type::box && m_filter.radius <= 0.5f;
-  const float r = m_filter.radius;
-  const int x0 = own_only ? own_x : std::max(0, static_cast<int>(std::ceil(x - 0.5f - r)));
-  const int y0 = own_only ? own_y : std::max(0, static_cast<int>(std::ceil(y - 0.5f - r)));
-  const int x1 = own_only ? own_x : std::min(m_width - 1, static_cast<int>(std::floor(x - 0.5f + r)));
-  const int y1 = own_only ? own_y : std::min(m_height - 1, static_cast<int>(std::floor(y - 0.5f + r)));
-  for (int i = x0; i <= x1; ++i)
-    m_weight_x[static_cast<std::size_t>(i - x0)] =
-        own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(i) + 0.5f - x);
-  for (int j = y0; j <= y1; ++j)
-    m_weight_y[static_cast<std::size_t>(j - y0)] =
-        weight * (own_only ? 1.0f : filter_weight(m_filter, static_cast<float>(j) + 0.5f - y));
-
-  for (int j = y0; j <= y1; ++j)
-    for (int i = x0; i <= x1; ++i) {
-      const double w = m_weight_x[static_cast<std::size_t>(i - x0)] * m_weight_y[static_cast<std::size_t>(j - y0)];
-      Sums& s = m_sums[static_cast<std::size_t>(j * m_width + i)];
+  place(x, y, weight, m_splat);
+  for (int j = m_splat.y0; j <= m_splat.y1; ++j)
+    for (int i = m_splat.x0; i <= m_splat.x1; ++i) {
+      const auto pixel = static_cast<std::size_t>(j * m_width + i);
+      const double w = m_splat.weight(i, j);
+      Sums& s = m_sums[pixel];
       s.w += w;
+      for (int c = 0; c < 3; ++c) s.wf[c] += w * f[c];
+      if (m_errors == Errors::neighbours) continue;
       s.w2 += w * w;
       for (int c = 0; c < 3; ++c) {
         const double wf = w * f[c];
-        s.wf[c] += wf;
         s.w2f2[c] += wf * wf;
         s.w2f[c] += w * wf;
+      }
+      if (m_replicates.empty()) continue;
+      Replicate& r = m_replicates[pixel * kReplicates + replicate];
+      r.w += static_cast<float>(w);
+      for (int c = 0; c < 3; ++c) r.wf[c] += static_cast<float>(w) * f[c];
+    }
+}
+
+void Film::add_neighbours(const Sample& a, const Sample& b, double share) {
+  if (!std::isfinite(luminance(a.value) + luminance(b.value))) return;
+  place(a.x, a.y, 1, m_splat);
+  place(b.x, b.y, 1, m_other);
+  for (int j = std::min(m_splat.y0, m_other.y0); j <= std::max(m_splat.y1, m_other.y1); ++j)
+    for (int i = std::min(m_splat.x0, m_other.x0); i <= std::max(m_splat.x1, m_other.x1); ++i) {
+      const double wa = m_splat.weight(i, j), wb = m_other.weight(i, j), w = wa - wb;
+      Sums& s = m_sums[static_cast<std::size_t>(j * m_width + i)];
+      s.w2 += share * w * w;
+      for (int c = 0; c < 3; ++c) {
+        const double wf = wa * a.value[c] - wb * b.value[c];
+        s.w2f2[c] += share * wf * wf;
+        s.w2f[c] += share * w * wf;
       }
     }
 }
@@ -82,6 +113,16 @@ ImageEstimate Film::develop() const {
         mean = s.wf[c] / s.w;
         // Ratio estimator, to first order: sum of (w (f - mean))^2 over (sum of w)^2.
         variance = (s.w2f2[c] - 2 * mean * s.w2f[c] + mean * mean * s.w2) / (s.w * s.w);
+        // The same with what a replicate sums in the place of w and w f.
+        if (!m_replicates.empty() && s.count >= kReplicates) {
+          double squares = 0;
+          for (std::size_t r = 0; r < kReplicates; ++r) {
+            const Replicate& replicate = m_replicates[p * kReplicates + r];
+            const double residual = replicate.wf[c] - mean * replicate.w;
+            squares += residual * residual;
+          }
+          variance = squares * kReplicates / (kReplicates - 1) / (s.w * s.w);
+        }
       } else {
         if (n == 0) continue;
         const double scale = area / (n * m_integral_x[column] * m_integral_y[row]);

@@ -11,9 +11,12 @@ namespace warpath {
 struct ImageEstimate {
   int width = 0, height = 0;
   std::vector<Color> mean;
-  std::vector<Color> variance;  ///< of the mean, per channel, from second moments
+  std::vector<Color> variance;  ///< of the mean, per channel, as the film's errors tell it
   std::vector<float> samples;   ///< how many samples fell into the pixel itself
 };
+
+/// Groups of samples whose spread tells the variance of what they share.
+inline constexpr std::uint32_t kReplicates = 8;
 
 /// Where samples become an image: each is splatted through the reconstruction filter, and the weights are divided out.
 /// Not thread-safe: batches are added one at a time, in a fixed order, so that sums in double do not depend on threads.
@@ -24,12 +27,29 @@ class Film {
     sampled,  ///< by the sum of the weights that fell there, as Mitsuba does: every pixel has its own samples
     expected  ///< by what uniform film positions would have brought: samples fall where a warp puts them
   };
-  Film(const FilmSettings& settings, Weights weights);
+  /// What tells the variance of the mean.
+  enum class Errors {
+    moments,     ///< second moments: samples are independent
+    replicates,  ///< the spread of kReplicates groups of samples: those of a group may depend on each other
+    neighbours   ///< differences of samples from neighbouring strata, see add_neighbours
+  };
+  /// replicates are for Weights::sampled.
+  Film(const FilmSettings& settings, Weights weights, Errors errors = Errors::moments);
 
   /// One sample at (x, y), in pixels from the corner of the crop window. A value that is not finite counts as 0, stays
   /// in the divisor, and is counted. weight: one over how densely its pixel is sampled, so that pixels with many
-  /// samples do not drown their neighbours in filters that reach over; 1 if all are alike.
-  void add(float x, float y, const Color& value, float weight = 1);
+  /// samples do not drown their neighbours in filters that reach over; 1 if all are alike. replicate: the group of the
+  /// sample, below kReplicates. Samples of different groups must be independent, in a pixel and across pixels. A pixel
+  /// with fewer samples than groups falls back to second moments, as if its samples were independent.
+  void add(float x, float y, const Color& value, float weight = 1, std::uint32_t replicate = 0);
+  /// Tells the variance of samples that lie one in each cell of a grid, which are far more even than independent ones:
+  /// a and b are samples from neighbouring cells, both added before, and `share` times their difference squared goes
+  /// into the sum of the samples' variances.
+  struct Sample {
+    float x, y;
+    Color value;
+  };
+  void add_neighbours(const Sample& a, const Sample& b, double share);
   /// Samples that fell at (x, y) with value 0 and need no splat under Weights::expected.
   void count(std::uint64_t samples) { m_samples += samples; }
 
@@ -49,13 +69,30 @@ class Film {
     double w2 = 0;     // w^2
     double count = 0;  // samples inside the pixel
   };
+  /// Sums over the splats of one replicate. In float: only their spread counts.
+  struct Replicate {
+    float wf[3]{}, w = 0;
+  };
+  /// The pixels that one position reaches, and its weight there along each axis.
+  struct Splat {
+    int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+    std::vector<float> x, y;
+    float weight(int i, int j) const {
+      if (i < x0 || i > x1 || j < y0 || j > y1) return 0;
+      return x[static_cast<std::size_t>(i - x0)] * y[static_cast<std::size_t>(j - y0)];
+    }
+  };
+  void place(float x, float y, float weight, Splat& splat) const;
+
   int m_width, m_height;
   ReconstructionFilter m_filter;
   Weights m_weights;
+  Errors m_errors;
   std::vector<Sums> m_sums;
   std::vector<double> m_integral_x, m_integral_y;
-  std::vector<float> m_weight_x, m_weight_y;  // scratch of one splat
+  Splat m_splat, m_other;  // scratch
   std::uint64_t m_samples = 0, m_non_finite = 0;
+  std::vector<Replicate> m_replicates;  // kReplicates for each pixel; empty without
 };
 
 }  // namespace warpath

@@ -29,13 +29,15 @@ constexpr std::uint64_t kEmissionStream = 0x656d697373690002u;
 constexpr std::uint64_t kAllocationStream = 0x616c6c6f63610005u;
 // Numbers of a latent's stream beyond those that stand for the dimensions of a path.
 constexpr std::uint32_t kComponentDimension = 0xfffffffeu;
+static_assert(kComponentDimension >= kFirstFreeDimension);
 
 /// Everything that a batch needs, kept from batch to batch.
 struct Job {
   std::vector<std::uint64_t> ids;
-  std::vector<std::uint32_t> pixels;
+  std::vector<std::uint32_t> pixels, indices, replicates;
+  Latents latents, warp_latents;
   Matrix<double> y;
-  std::vector<double> u, log_q;
+  std::vector<double> z, u, log_q;
   std::vector<float> inv_q, film_x, film_y, weight;
   VertexSourceScratch vertices;
   std::unique_ptr<VertexRecorder> recorder;
@@ -68,25 +70,52 @@ std::vector<std::uint8_t> dilate(const std::vector<std::uint8_t>& mask, int widt
   return wide;
 }
 
-/// weight: one per lane, or empty if all are 1.
+/// weight and replicates: one per lane, or empty if all are 1 and 0.
 void add_to_film(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t lanes,
-                 std::span<const float> weight = {}) {
+                 std::span<const float> weight = {}, std::span<const std::uint32_t> replicates = {}) {
   const auto crop_x = static_cast<float>(settings.crop_x), crop_y = static_cast<float>(settings.crop_y);
   for (std::size_t i = 0; i < lanes; ++i)
     film.add(results.film_x[i] - crop_x, results.film_y[i] - crop_y, results.radiance[i],
-             weight.empty() ? 1.0f : weight[i]);
+             weight.empty() ? 1.0f : weight[i], replicates.empty() ? 0 : replicates[i]);
+}
+
+/// Shows the film how samples `begin` ... `begin + cells` differ, which lie one in each cell of a grid with rows of
+/// `row` cells. Two samples of one cell would tell its variance, half their squared difference. Neighbours lie further
+/// apart: across a straight edge, where the noise of directly seen emission is, those of a row and a column together
+/// differ twice as often. (Edge along an axis: the offset of two samples of a cell is 1/3 of a cell on average, and so
+/// it is for neighbours along the edge; for those across it is 1.) Hence a quarter of each squared difference; smooth
+/// changes are overestimated by 2.
+void add_grid_errors(Film& film, const FilmSettings& settings, const PathResults& results, std::size_t begin,
+                     std::size_t row, std::size_t cells) {
+  const std::size_t rows = cells / row, pairs = (row - 1) * rows + row * (rows - 1);
+  const double share = 0.25 * static_cast<double>(cells) / static_cast<double>(pairs);
+  const auto crop_x = static_cast<float>(settings.crop_x), crop_y = static_cast<float>(settings.crop_y);
+  const auto sample = [&](std::size_t i) {
+    return Film::Sample{results.film_x[i] - crop_x, results.film_y[i] - crop_y, results.radiance[i]};
+  };
+  const auto compare = [&](std::size_t a, std::size_t b) {
+    // Where both see the same, only the filter's slope is between them, which is nothing beside an edge.
+    if (!(results.radiance[a] == results.radiance[b])) film.add_neighbours(sample(a), sample(b), share);
+  };
+  for (std::size_t i = 0; i < cells; ++i) {
+    if (i % row + 1 < row) compare(begin + i, begin + i + 1);
+    if (i + row < cells) compare(begin + i, begin + i + row);
+  }
 }
 
 }  // namespace
 
 ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal,
-                               std::uint64_t seed)
+                               std::uint64_t seed, Sampler sampler)
     : m_tracer(tracer),
       m_layout(std::move(layout)),
       m_proposal(std::move(proposal)),
       m_seed(seed),
+      m_sampler(sampler),
       m_joint(m_layout.contains({GroupKind::film})),
-      m_film(tracer.scene().film, m_joint ? Film::Weights::expected : Film::Weights::sampled) {
+      m_film(tracer.scene().film, m_joint ? Film::Weights::expected : Film::Weights::sampled,
+             sampler == Sampler::independent ? Film::Errors::moments : Film::Errors::replicates) {
+  WARPATH_CHECK(!m_joint || m_sampler == Sampler::independent);
   if (m_proposal) WARPATH_CHECK_EQ(m_proposal->dims(), m_layout.dims());
   const FilmSettings& film = tracer.scene().film;
   m_pixels = tiled_pixels(film.crop_width, film.crop_height);
@@ -95,12 +124,12 @@ ImageEstimator::ImageEstimator(const Tracer& tracer, Layout layout, std::shared_
   const auto may_see = dilate(tracer.may_see_emission(), film.crop_width, film.crop_height, reach);
   for (const std::uint32_t pixel : m_pixels)
     if (may_see[pixel]) m_emission_pixels.push_back(pixel);
-  if (!m_emission_pixels.empty()) m_emission.emplace(film, Film::Weights::sampled);
+  if (!m_emission_pixels.empty()) m_emission.emplace(film, Film::Weights::sampled, Film::Errors::neighbours);
 }
 
 void ImageEstimator::add_pass(int spp, const Progress& progress, const std::function<bool()>& stop) {
   add_emission_pass(spp, stop);
-  add_paths(spp, {}, progress, stop);
+  add_paths(spp, nullptr, progress, stop);
 }
 
 void ImageEstimator::add_guided_pass(int spp, const Guidance& guidance, const Progress& progress,
@@ -109,12 +138,13 @@ void ImageEstimator::add_guided_pass(int spp, const Guidance& guidance, const Pr
   add_emission_pass(spp, stop);
   if (!m_moments) m_moments.emplace(m_film.width(), m_film.height());
   m_pass_moments.emplace(m_film.width(), m_film.height());
-  add_paths(spp, guidance, progress, stop);
+  add_paths(spp, &guidance, progress, stop);
   *m_moments += *m_pass_moments;
 }
 
-void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress& progress,
+void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& progress,
                                const std::function<bool()>& stop) {
+  const Guidance guidance = guide ? *guide : Guidance{};
   const FilmSettings& film = m_tracer.scene().film;
   const std::size_t pixels = m_pixels.size();
   const auto dims = static_cast<std::size_t>(m_layout.dims());
@@ -141,6 +171,8 @@ void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress
     job.ids.clear();
     job.pixels.clear();
     job.weight.clear();
+    job.indices.clear();
+    job.replicates.clear();
     const std::size_t from = batch * kBatch, to = std::min(total, from + kBatch);
     if (m_joint) {
       for (std::size_t i = from; i < to; ++i) job.ids.push_back(first * pixels + i);
@@ -150,28 +182,42 @@ void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress
     for (std::size_t i = from; i < to; ++i) {
       while (i >= begin[k + 1]) ++k;
       const std::uint32_t pixel = m_pixels[k];
-      job.ids.push_back((m_begun[pixel] + (i - begin[k])) * pixels + pixel);
+      const std::uint64_t in_pass = i - begin[k], in_pixel = m_begun[pixel] + in_pass;
       job.pixels.push_back(pixel);
+      if (m_sampler == Sampler::independent) {
+        job.ids.push_back(in_pixel * pixels + pixel);
+      } else {
+        // A stream for each pixel, replicate, and pass that begins anew.
+        const std::uint64_t replicate = in_pixel % kReplicates, sequence = guide ? first + 1 : 0;
+        job.ids.push_back((sequence * kReplicates + replicate) * pixels + pixel);
+        job.indices.push_back(static_cast<std::uint32_t>((guide ? in_pass : in_pixel) / kReplicates));
+        job.replicates.push_back(static_cast<std::uint32_t>(replicate));
+      }
       if (guidance.objective) job.weight.push_back(static_cast<float>(spp) / static_cast<float>(counts[pixel]));
     }
   };
   const auto place_on_film = [&](Job& job) {
     const std::uint32_t d = Group{GroupKind::film}.first_dimension();
     const auto width = static_cast<std::uint32_t>(film.crop_width);
+    job.latents.fill(d, job.film_x.data());
+    job.latents.fill(d + 1, job.film_y.data());
     for (std::size_t i = 0; i < job.pixels.size(); ++i) {
-      const std::uint64_t key = sample_key(m_seed, job.ids[i]);
-      job.film_x[i] = film_position(job.pixels[i] % width, sample_float(key, d), film.crop_width);
-      job.film_y[i] = film_position(job.pixels[i] / width, sample_float(key, d + 1), film.crop_height);
+      job.film_x[i] = film_position(job.pixels[i] % width, job.film_x[i], film.crop_width);
+      job.film_y[i] = film_position(job.pixels[i] / width, job.film_y[i], film.crop_height);
     }
   };
   const auto draw_primary_samples = [&](Job& job) {
     const std::size_t n = job.ids.size();
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::uint64_t key = sample_key(latent_seed, job.ids[i]);
-      for (std::size_t c = 0; c < dims; ++c) job.y(i, c) = sample_double(key, m_layout.dimension(static_cast<int>(c)));
-      // Stratified over the batch: the share of each component is the same in every batch.
-      job.u[i] = (static_cast<double>(i) + sample_double(key, kComponentDimension)) / static_cast<double>(n);
+    job.warp_latents.assign(m_sampler, latent_seed, job.ids, job.indices);
+    for (std::size_t c = 0; c < dims; ++c) {
+      job.warp_latents.fill(m_layout.dimension(static_cast<int>(c)), job.z.data());
+      for (std::size_t i = 0; i < n; ++i) job.y(i, c) = job.z[i];
     }
+    job.warp_latents.fill(kComponentDimension, job.u.data());
+    // Over a warped film every sample stands for the whole image, so components may be stratified over the batch: the
+    // share of each is the same in every batch. A pixel of a stratified film needs all of them.
+    if (m_joint)
+      for (std::size_t i = 0; i < n; ++i) job.u[i] = (static_cast<double>(i) + job.u[i]) / static_cast<double>(n);
     const auto y = job.y.batch().rows_from(0, n);
     m_proposal->sample(y, std::span(job.u).first(n), y, std::span(job.log_q).first(n));
     for (std::size_t i = 0; i < n; ++i) job.inv_q[i] = static_cast<float>(std::exp(-job.log_q[i]));
@@ -187,20 +233,22 @@ void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress
     job.film_y.resize(m_joint ? 0 : n);
     if (m_proposal) {
       if (job.y.rows() < n) job.y = Matrix<double>(std::max(n, kBatch), dims);
+      job.z.resize(std::max(n, kBatch));
       job.u.resize(std::max(n, kBatch));
       job.log_q.resize(std::max(n, kBatch));
       job.inv_q.resize(n);
       draw_primary_samples(job);
     }
     job.warp_seconds = m_proposal ? seconds_since(begin) : 0;
+    job.latents.assign(m_sampler, m_seed, job.ids, job.indices);
     if (!m_joint) place_on_film(job);
     if (guidance.learner && !job.recorder) job.recorder = guidance.learner->make_recorder();
     if (guidance.warp) {
-      VertexSource source(m_seed, job.ids, *guidance.warp, job.film_x, job.film_y, job.vertices);
+      VertexSource source(job.latents, *guidance.warp, job.film_x, job.film_y, job.vertices);
       m_tracer.trace(source, n, job.results, job.recorder.get());
     } else {
       static const Layout uniform;
-      WarpedSource source(m_seed, job.ids, m_proposal ? m_layout : uniform, job.y.batch(),
+      WarpedSource source(job.latents, m_proposal ? m_layout : uniform, job.y.batch(),
                           m_proposal ? std::span<const float>(job.inv_q) : std::span<const float>(), job.film_x,
                           job.film_y);
       m_tracer.trace(source, n, job.results, job.recorder.get());
@@ -209,7 +257,7 @@ void ImageEstimator::add_paths(int spp, const Guidance& guidance, const Progress
   };
   const auto merge = [&](Job& job, std::size_t batch) {
     const auto begin = Clock::now();
-    add_to_film(m_film, film, job.results, job.ids.size(), job.weight);
+    add_to_film(m_film, film, job.results, job.ids.size(), job.weight, job.replicates);
     if (m_pass_moments)
       for (std::size_t i = 0; i < job.pixels.size(); ++i) m_pass_moments->add(job.pixels[i], job.results.radiance[i]);
     if (job.recorder) guidance.learner->merge(*job.recorder);
@@ -233,14 +281,24 @@ void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& sto
   const auto start = Clock::now();
   // A jittered grid inside each pixel, of at least `rays` cells.
   const int nx = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(rays)))), ny = (rays + nx - 1) / nx;
-  const auto cells = static_cast<std::size_t>(nx * ny);
-  const std::size_t total = m_emission_pixels.size() * cells, batches = (total + kBatch - 1) / kBatch;
+  const auto cells = static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny);
+  // A batch takes whole pixels, or whole rows of a pixel's grid if that is too large.
+  const std::size_t row = static_cast<std::size_t>(nx);
+  const std::size_t lanes = cells <= kBatch ? kBatch / cells * cells : std::max<std::size_t>(1, kBatch / row) * row;
+  const std::size_t per_pixel = (cells + lanes - 1) / lanes;  // batches; 1 for whole pixels
+  const std::size_t total = m_emission_pixels.size() * cells;
+  const std::size_t batches = per_pixel > 1 ? m_emission_pixels.size() * per_pixel : (total + lanes - 1) / lanes;
+  // The first ray of a batch.
+  const auto first_ray = [&](std::size_t batch) {
+    if (per_pixel == 1) return std::min(total, batch * lanes);
+    return batch / per_pixel * cells + batch % per_pixel * lanes;
+  };
   const std::uint64_t seed = mix64(m_seed ^ kEmissionStream);
   const std::uint64_t first_id = m_emission_rays;
   m_emission_rays += total;
 
   const auto work = [&](Job& job, std::size_t batch) {
-    const std::size_t begin = batch * kBatch, n = std::min(total, begin + kBatch) - begin;
+    const std::size_t begin = first_ray(batch), n = first_ray(batch + 1) - begin;
     job.ids.resize(n);
     job.film_x.resize(n);
     job.film_y.resize(n);
@@ -257,11 +315,15 @@ void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& sto
       job.film_y[i] = film_position(pixel / width, y, film.crop_height);
     }
     static const Layout uniform;
-    WarpedSource source(seed, job.ids, uniform, {}, {}, job.film_x, job.film_y);
+    job.latents.assign(seed, job.ids);
+    WarpedSource source(job.latents, uniform, {}, {}, job.film_x, job.film_y);
     m_tracer.trace_emission(source, n, job.results);
   };
   const auto merge = [&](Job& job, std::size_t) {
     add_to_film(*m_emission, film, job.results, job.ids.size());
+    const std::size_t grid = std::min(cells, job.ids.size());
+    for (std::size_t i = 0; i < job.ids.size(); i += grid)
+      add_grid_errors(*m_emission, film, job.results, i, row, grid);
     m_cost.emission_rays += job.ids.size();
   };
   run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/latents.h"
 #include "core/ordered.h"
 #include "core/vertex_recorder.h"
 #include "estimate/allocation.h"
@@ -42,7 +43,11 @@ class ImageEstimator {
  public:
   /// The tracer must outlive the estimator. proposal: null draws all numbers uniformly; else proposal->dims() ==
   /// layout.dims(). The same seed gives the same bits for any number of threads, if the passes are the same.
-  ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal, std::uint64_t seed);
+  /// Every sampler but `independent` is for stratified films: a pixel's samples go in turn to kReplicates sequences of
+  /// their own, whose spread tells the variance. Plain passes carry the sequences on; each guided pass begins anew,
+  /// since points that fit those of earlier passes would depend on what these taught.
+  ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal, std::uint64_t seed,
+                 Sampler sampler = Sampler::independent);
 
   /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and 4 x spp camera rays to each
   /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
@@ -69,14 +74,16 @@ class ImageEstimator {
   const PixelMoments& pass_moments() const { return *m_pass_moments; }
   const PixelMoments& moments() const { return *m_moments; }
   const RenderCost& cost() const { return m_cost; }
+  Sampler sampler() const { return m_sampler; }
 
  private:
-  void add_paths(int spp, const Guidance& guidance, const Progress& progress, const std::function<bool()>& stop);
+  void add_paths(int spp, const Guidance* guidance, const Progress& progress, const std::function<bool()>& stop);
 
   const Tracer& m_tracer;
   Layout m_layout;
   std::shared_ptr<const Proposal> m_proposal;
   std::uint64_t m_seed;
+  Sampler m_sampler;
   bool m_joint;                                  // the film is among the warped dimensions
   std::vector<std::uint32_t> m_pixels;           // in the order in which they are rendered: compact tiles
   std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter

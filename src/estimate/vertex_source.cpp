@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/rng.h"
-
 namespace warpath {
 
 void VertexSource::locate(std::uint16_t bounce, std::span<const std::uint32_t> lanes, const VertexContext& context) {
@@ -30,10 +28,7 @@ void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<cons
   for (auto& z : m_scratch.z) z.resize(std::max(z.size(), n));
   for (auto& y : m_scratch.y) y.resize(std::max(y.size(), n));
   const std::uint32_t d = first.first_dimension();
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::uint64_t key = sample_key(m_seed, m_ids[lanes[i]]);
-    for (std::uint32_t a = 0; a < 3; ++a) m_scratch.z[a][i] = sample_double(key, d + a);
-  }
+  for (std::uint32_t a = 0; a < 3; ++a) latents().fill(d + a, lanes, m_scratch.z[a].data());
   const auto& z = m_scratch.z;
   locate(first.bounce, lanes, context);
   m_warp.sample(which, context, m_scratch.places.data(), n, {z[0].data(), z[1].data(), z[2].data()},

@@ -23,17 +23,11 @@ struct VertexSourceScratch {
 class VertexSource final : public UniformSource {
  public:
   /// Views: film positions in [0,1), one per lane.
-  VertexSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const VertexWarp& warp,
-               std::span<const float> film_x, std::span<const float> film_y, VertexSourceScratch& scratch)
-      : UniformSource(seed, ids),
-        m_seed(seed),
-        m_ids(ids),
-        m_warp(warp),
-        m_film_x(film_x),
-        m_film_y(film_y),
-        m_scratch(scratch) {
-    scratch.place_of_lane.resize(ids.size());
-    scratch.located.assign(ids.size(), 0);
+  VertexSource(const Latents& latents, const VertexWarp& warp, std::span<const float> film_x,
+               std::span<const float> film_y, VertexSourceScratch& scratch)
+      : UniformSource(latents), m_warp(warp), m_film_x(film_x), m_film_y(film_y), m_scratch(scratch) {
+    scratch.place_of_lane.resize(latents.size());
+    scratch.located.assign(latents.size(), 0);
   }
 
   bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
@@ -47,8 +41,6 @@ class VertexSource final : public UniformSource {
   void draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
                     const VertexContext& context, float* inv_q);
 
-  std::uint64_t m_seed;
-  std::span<const std::uint64_t> m_ids;
   const VertexWarp& m_warp;
   std::span<const float> m_film_x, m_film_y;
   VertexSourceScratch& m_scratch;

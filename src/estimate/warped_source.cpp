@@ -2,11 +2,9 @@
 
 namespace warpath {
 
-WarpedSource::WarpedSource(std::uint64_t seed, std::span<const std::uint64_t> ids, const Layout& layout,
-                           Batch<const double> y, std::span<const float> inv_q, std::span<const float> film_x,
-                           std::span<const float> film_y)
-    : UniformSource(seed, ids),
-      m_fixed(seed, ids, layout, y.data(), y.stride()),
+WarpedSource::WarpedSource(const Latents& latents, const Layout& layout, Batch<const double> y,
+                           std::span<const float> inv_q, std::span<const float> film_x, std::span<const float> film_y)
+    : m_fixed(latents, layout, y.data(), y.stride()),
       m_layout(layout),
       m_inv_q(inv_q),
       m_film_x(film_x),

@@ -57,6 +57,8 @@ void for_each_field(Run& run, F&& f) {
   f("mape", run.mape);
   f("mse_raw", run.mse_raw);
   f("relmse_raw", run.relmse_raw);
+  f("mse_predicted", run.mse_predicted);
+  f("relmse_predicted", run.relmse_predicted);
   f("mse_rest", run.mse_rest);
   f("relmse_rest", run.relmse_rest);
   f("mean", run.mean);

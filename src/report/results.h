@@ -47,6 +47,8 @@ struct MethodRun {
   double mape = kUnknown;
   double mse_raw = kUnknown;
   double relmse_raw = kUnknown;
+  double mse_predicted = kUnknown;  ///< by the image's own variance, without a reference but for what relMSE divides by
+  double relmse_predicted = kUnknown;
   double mse_rest = kUnknown;  ///< `rest`: without directly seen emission
   double relmse_rest = kUnknown;
   std::array<double, 3> mean{kUnknown, kUnknown, kUnknown};

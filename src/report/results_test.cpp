@@ -100,6 +100,8 @@ TEST_F(ResultsTest, json_has_the_promised_fields) {
                             "mape",
                             "mse_raw",
                             "relmse_raw",
+                            "mse_predicted",
+                            "relmse_predicted",
                             "mse_rest",
                             "relmse_rest",
                             "mean",
