@@ -150,6 +150,24 @@ TEST(Samplers, ReplicatesTellTheVarianceThatRepetitionsShow) {
   }
 }
 
+// Edges that cross a grid in any direction; what is smooth, and cells that are not small beside a pixel, are
+// overestimated. Second moments would be several times too large.
+TEST(Samplers, NeighbouringCellsTellTheVarianceOfDirectlySeenEmission) {
+  const Spread spread = repeat(200, 1200, [&](std::uint64_t seed) {
+    ImageEstimator estimator(*box_tracer(), {}, nullptr, seed);
+    estimator.add_emission_pass(32);
+    return estimator.develop_emission();
+  });
+  double measured = 0, predicted = 0;
+  for (std::size_t p = 0; p < spread.sum.size(); ++p) {
+    measured += spread.variance(p);
+    predicted += spread.predicted[p] / spread.runs;
+  }
+  ASSERT_GT(measured, 0);
+  EXPECT_GT(predicted / measured, 0.7);
+  EXPECT_LT(predicted / measured, 1.5);
+}
+
 TEST(Samplers, SequencesLessenTheVarianceOfDirectLight) {
   // One bounce has few dimensions: here sequences must show what they are for.
   Scene scene = box_tracer()->scene();

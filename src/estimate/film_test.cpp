@@ -115,6 +115,51 @@ TEST(Film, ExpectedWeightsAreUnbiasedAndTheirVarianceIsRight) {
   }
 }
 
+TEST(Film, ReplicatesTellTheVarianceOfSamplesThatDependOnEachOther) {
+  // All samples that a pixel has in one replicate are equal, so that second moments see a fourth of the variance; the
+  // tent mixes pixels.
+  constexpr int kWidth = 5, kHeight = 4, kRuns = 400, kEach = 4;
+  double measured = 0, replicates = 0, moments = 0;
+  std::vector<double> sum(kWidth * kHeight), sum2(kWidth * kHeight);
+  for (std::uint64_t run = 0; run < kRuns; ++run) {
+    const FilmSettings s = settings(kWidth, kHeight, Type::tent, 1);
+    Film film(s, Film::Weights::sampled, Film::Errors::replicates), plain(s, Film::Weights::sampled);
+    for (std::uint32_t p = 0; p < kWidth * kHeight; ++p)
+      for (std::uint32_t i = 0; i < kEach * kReplicates; ++i) {
+        const std::uint32_t r = i % kReplicates;
+        const std::uint64_t key = sample_key(run, p * kReplicates + r);
+        const float x = static_cast<float>(p % kWidth) + sample_float(key, 0),
+                    y = static_cast<float>(p / kWidth) + sample_float(key, 1);
+        const Color value(1 + 2 * sample_float(key, 2));
+        film.add(x, y, value, 1, r);
+        plain.add(x, y, value);
+      }
+    const ImageEstimate image = film.develop(), of_moments = plain.develop();
+    for (std::size_t p = 0; p < sum.size(); ++p) {
+      EXPECT_EQ(image.mean[p].x, of_moments.mean[p].x);
+      sum[p] += image.mean[p].x;
+      sum2[p] += sqr(image.mean[p].x);
+      replicates += image.variance[p].x / kRuns;
+      moments += of_moments.variance[p].x / kRuns;
+    }
+  }
+  for (std::size_t p = 0; p < sum.size(); ++p) measured += sum2[p] / kRuns - sqr(static_cast<float>(sum[p] / kRuns));
+  // 20 variances of 400 values each, of which neighbours share much: a standard error of about 3 %.
+  EXPECT_NEAR(replicates / measured, 1, 0.12);
+  EXPECT_LT(moments / measured, 0.4);
+}
+
+TEST(Film, PixelsWithFewerSamplesThanReplicatesFallBackToSecondMoments) {
+  const FilmSettings s = settings(1, 1, Type::box, 0.5f);
+  Film film(s, Film::Weights::sampled, Film::Errors::replicates), plain(s, Film::Weights::sampled);
+  for (std::uint32_t i = 0; i < kReplicates - 1; ++i) {
+    film.add(0.5f, 0.5f, Color(static_cast<float>(i)), 1, i);
+    plain.add(0.5f, 0.5f, Color(static_cast<float>(i)));
+  }
+  EXPECT_GT(film.develop().variance[0].x, 0);
+  EXPECT_EQ(film.develop().variance[0].x, plain.develop().variance[0].x);
+}
+
 TEST(Film, NonFiniteSamplesCountAsZeroAndStayInTheDivisor) {
   Film film(settings(1, 1, Type::box, 0.5f), Film::Weights::sampled);
   const float infinity = std::numeric_limits<float>::infinity();
