@@ -25,6 +25,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   struct Entry {
     std::uint32_t root_key, cell;
     std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
+    float light, scatter;                  // f / q
     float light_moment, scatter_moment;
     FieldTree::Features at;
   };
@@ -34,11 +35,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     const FieldGrids& grids = m_trainer.m_grids;
     const auto& u = records.numbers;
     const bool squared = m_trainer.m_settings.target == FieldSettings::Target::second_moment;
-    // f / q, or f^2 / q, of a term f / q.
-    const auto moment = [squared](float term, float inv_q) {
-      const float m = squared ? term * term / inv_q : term;
-      return std::isfinite(m) ? m : 0.0f;
-    };
+    const auto finite = [](float term) { return std::isfinite(term) ? term : 0.0f; };
     for (std::size_t i = 0; i < records.lanes.size(); ++i) {
       Entry entry;
       entry.root_key = FieldTree::root_key(records.context, i);
@@ -49,8 +46,11 @@ class FieldTrainer::Recorder final : public VertexRecorder {
       entry.light_bin = lit ? static_cast<std::uint16_t>(grids.light.bin(u[0][i], u[1][i], u[2][i])) : kNoBin;
       entry.scatter_bin =
           static_cast<std::uint16_t>(grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]));
-      entry.light_moment = moment(records.light[i], records.inv_q_light[i]);
-      entry.scatter_moment = moment(records.beyond[i], records.inv_q_scatter[i]);
+      entry.light = finite(records.light[i]);
+      entry.scatter = finite(records.beyond[i]);
+      // f / q, or f^2 / q.
+      entry.light_moment = squared ? finite(entry.light * entry.light / records.inv_q_light[i]) : entry.light;
+      entry.scatter_moment = squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
       entries.push_back(entry);
     }
   }
@@ -104,12 +104,12 @@ void FieldTrainer::merge(VertexRecorder& recorder) {
       Bin& bin = m_light[e.cell * light_bins + e.light_bin];
       bin.moment += e.light_moment;
       bin.draws += 1;
-      cell.light_draws += 1;
+      cell.light.add(e.light);
     }
     Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
     bin.moment += e.scatter_moment;
     bin.draws += 1;
-    cell.scatter_draws += 1;
+    cell.scatter.add(e.scatter);
   }
   entries.clear();
 }
@@ -160,7 +160,8 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
   const double offset = std::sqrt(0.75 * variance[feature]);
   const auto half = [&](double side) {
     Cell cell = parent;
-    cell.visits *= 0.5, cell.light_draws *= 0.5, cell.scatter_draws *= 0.5;
+    cell.visits *= 0.5;
+    cell.light.halve(), cell.scatter.halve();
     for (std::size_t k = 0; k < kFeatures; ++k) {
       const double m = k == feature ? mean[k] + side * offset : mean[k];
       cell.sum[k] = m * cell.visits;
@@ -173,7 +174,7 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
   return true;
 }
 
-void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws,
+void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
                                HalfProbability* density) const {
   const std::uint32_t count = grid.bins();
   static thread_local std::vector<double> moment, drawn, volume, expected;
@@ -188,17 +189,18 @@ void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bin
   for (std::uint32_t node = count - 1; node > 0; --node)
     for (auto* heap : {&moment, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
   // Each half is drawn to the whole that it is part of, the more the fewer samples it has seen.
-  expected[1] = draws > 0 ? moment[1] / draws : 0;
+  expected[1] = all.n > 0 ? moment[1] / all.n : 0;
   double sum = 0;
   const bool squared = m_settings.target == FieldSettings::Target::second_moment;
   const auto wanted = [squared](double m) { return squared ? std::sqrt(m) : m; };
   for (std::uint32_t node = 2; node < 2 * count; ++node) {
     const double whole = expected[node / 2];
-    const double own = volume[node] > 0 && draws > 0 ? moment[node] / (draws * volume[node]) : 0;
+    const double own = volume[node] > 0 && all.n > 0 ? moment[node] / (all.n * volume[node]) : 0;
     expected[node] = (drawn[node] * own + m_settings.shrink * whole) / (drawn[node] + m_settings.shrink);
     if (node >= count) sum += wanted(expected[node]) * volume[node];
   }
-  const double share = sum > 0 ? (1 - m_settings.uniform) * draws / (draws + m_settings.trust) : 0;
+  const double effective = all.effective();
+  const double share = sum > 0 ? (1 - m_settings.uniform) * effective / (effective + m_settings.trust) : 0;
   for (std::uint32_t b = 0; b < count; ++b)
     masses[b] = static_cast<float>(volume[count + b] *
                                    (1 - share + (share > 0 ? share * wanted(expected[count + b]) / sum : 0)));
@@ -212,10 +214,10 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
   std::vector<HalfProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
   tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
     const Cell& cell = m_cells[c];
-    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light_draws,
+    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light,
                 light.data() + c * light_stored);
     fit_density(m_grids.grid(VertexNumbers::scatter, cell.kind),
-                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), cell.scatter_draws,
+                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), cell.scatter,
                 scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;

@@ -27,10 +27,19 @@ class FieldTrainer final : public VertexLearner {
  private:
   class Recorder;
 
+  /// Sums over draws of one kind of numbers.
+  struct Draws {
+    double n = 0, sum = 0, square = 0;  // of f / q
+    void add(float term) { n += 1, sum += term, square += static_cast<double>(term) * term; }
+    void halve() { n *= 0.5, sum *= 0.5, square *= 0.5; }
+    /// How many equal samples would tell as much: a few that outshine all others tell little.
+    double effective() const { return square > 0 ? sum * sum / square : 0; }
+  };
   /// Sums over vertices.
   struct Cell {
     SurfaceKind kind;
-    double visits = 0, light_draws = 0, scatter_draws = 0;
+    double visits = 0;
+    Draws light, scatter;
     std::array<double, FieldTree::kFeatures> sum{}, square{};  // of features
   };
   struct Bin {
@@ -43,7 +52,8 @@ class FieldTrainer final : public VertexLearner {
   void cut_cells();
   /// extent2: squared width of the scene. Returns false if all vertices of the cell are in one place.
   bool cut(std::uint32_t cell, double extent2);
-  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double draws, HalfProbability* density) const;
+  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
+                   HalfProbability* density) const;
 
   FieldSettings m_settings;
   FieldGrids m_grids;
