@@ -29,28 +29,28 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     float light_moment, scatter_moment;
     FieldTree::Features at;
   };
-  explicit Recorder(const FieldTrainer& trainer) : m_trainer(trainer) {}
+  Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree)
+      : m_squared(settings.target == FieldSettings::Target::second_moment), m_grids(grids), m_tree(std::move(tree)) {}
 
   void record(const VertexRecords& records) override {
-    const FieldGrids& grids = m_trainer.m_grids;
     const auto& u = records.numbers;
-    const bool squared = m_trainer.m_settings.target == FieldSettings::Target::second_moment;
     const auto finite = [](float term) { return std::isfinite(term) ? term : 0.0f; };
     for (std::size_t i = 0; i < records.lanes.size(); ++i) {
       Entry entry;
       entry.root_key = FieldTree::root_key(records.context, i);
       entry.at = FieldTree::features(records.context, i);
-      entry.cell = m_trainer.m_tree.cell(entry.root_key, entry.at);
+      entry.cell = m_tree->cell(entry.root_key, entry.at);
       const auto kind = static_cast<SurfaceKind>(records.context.kind[i]);
       const bool lit = kind != SurfaceKind::delta && kind != SurfaceKind::null;
-      entry.light_bin = lit ? static_cast<std::uint16_t>(grids.light.bin(u[0][i], u[1][i], u[2][i])) : kNoBin;
+      entry.light_bin = lit ? static_cast<std::uint16_t>(m_grids.light.bin(u[0][i], u[1][i], u[2][i])) : kNoBin;
       entry.scatter_bin =
-          static_cast<std::uint16_t>(grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]));
+          static_cast<std::uint16_t>(m_grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]));
       entry.light = finite(records.light[i]);
       entry.scatter = finite(records.beyond[i]);
       // f / q, or f^2 / q.
-      entry.light_moment = squared ? finite(entry.light * entry.light / records.inv_q_light[i]) : entry.light;
-      entry.scatter_moment = squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
+      entry.light_moment = m_squared ? finite(entry.light * entry.light / records.inv_q_light[i]) : entry.light;
+      entry.scatter_moment =
+          m_squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
       entries.push_back(entry);
     }
   }
@@ -58,13 +58,17 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   std::vector<Entry> entries;
 
  private:
-  const FieldTrainer& m_trainer;
+  const bool m_squared;
+  const FieldGrids& m_grids;
+  const std::shared_ptr<const FieldTree> m_tree;
 };
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
     : m_settings(settings), m_grids(light_parts) {}
 
-std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const { return std::make_unique<Recorder>(*this); }
+std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const {
+  return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass);
+}
 
 void FieldTrainer::add_root(std::uint32_t key) {
   m_tree.add_root(key);
@@ -209,6 +213,7 @@ void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bin
 
 std::shared_ptr<const Field> FieldTrainer::fit() {
   if (!m_cells.empty()) cut_cells();
+  m_tree_of_pass = std::make_shared<const FieldTree>(m_tree);
   const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
   const std::size_t light_stored = m_grids.light.stored(), scatter_stored = m_grids.diffuse.stored();
   std::vector<HalfProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);

@@ -58,6 +58,8 @@ class FieldTrainer final : public VertexLearner {
   FieldSettings m_settings;
   FieldGrids m_grids;
   FieldTree m_tree;
+  // As it was before this pass: recorders look vertices up while batches are merged, which may add roots.
+  std::shared_ptr<const FieldTree> m_tree_of_pass = std::make_shared<const FieldTree>();
   std::vector<Cell> m_cells;
   std::vector<Bin> m_light, m_scatter;  // bins() for each cell
 };
