@@ -17,9 +17,10 @@ target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -f
 
 # warpath_folder(NAME [folders and libraries it may use]... [FOR_TESTS file...])
 # Makes the library warpath_NAME of the sources in the current folder (but not main.cpp), and NAME_test of the tests beside them.
+# PRECOMPILE reads the headers of other libraries once for the whole folder: where that takes longer than its own code.
 # Files FOR_TESTS make a library of their own, warpath_NAME_for_tests: what tests of this and other folders share.
 function(warpath_folder NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 folder "" "" FOR_TESTS)
+  cmake_parse_arguments(PARSE_ARGV 1 folder PRECOMPILE "" FOR_TESTS)
   list(TRANSFORM folder_FOR_TESTS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
   file(GLOB sources CONFIGURE_DEPENDS *.cpp)
   file(GLOB tests CONFIGURE_DEPENDS *_test.cpp)
@@ -27,6 +28,10 @@ function(warpath_folder NAME)
   add_library(warpath_${NAME} STATIC ${sources})
   target_include_directories(warpath_${NAME} PUBLIC ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(warpath_${NAME} PUBLIC warpath_flags ${folder_UNPARSED_ARGUMENTS})
+  if(folder_PRECOMPILE)
+    target_precompile_headers(warpath_${NAME} PRIVATE <fmt/format.h> <spdlog/spdlog.h> <Imath/ImathColor.h> <Imath/ImathMatrix.h>
+                              <algorithm> <filesystem> <functional> <map> <memory> <optional> <string> <variant> <vector>)
+  endif()
   if(NOT WARPATH_TESTS)
     return()
   endif()
