@@ -176,6 +176,11 @@ def all_scenes():
     return small + sorted((ROOT / "scenes").glob("*/scene.xml"))
 
 
+def without_motion(scene):
+    """Definitions that put still shapes in the place of moving ones, which Mitsuba cannot read, if a scene offers that."""
+    return {"motion": "still"} if '<default name="motion"' in scene.read_text(encoding="utf-8") else {}
+
+
 def size_of_film(scene, size):
     """Definitions of resx and resy that make a project scene small, if it has such parameters."""
     if "<default name=\"resx\"" not in scene.read_text(encoding="utf-8"):
@@ -205,7 +210,7 @@ def parse_options():
 
 def compare(scene, options):
     """(agrees, text) for a scene."""
-    defines = dict(d.split("=", 1) for d in options.defines)
+    defines = without_motion(scene) | dict(d.split("=", 1) for d in options.defines)
     if options.reference:
         rfilter = mi.load_file(str(scene), **defines).sensors()[0].film().rfilter()
         variance_file = options.reference_variance or options.reference.with_suffix(".variance.exr")
