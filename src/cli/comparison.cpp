@@ -227,12 +227,14 @@ void ComparisonRunner::keep_densities(const Method& method, const PreparedMethod
   if (!prepared.candidates || !prepared.proposal) return;
   constexpr int kBins = 64;
   constexpr std::uint64_t kSamples = 1 << 20;
-  // Neighbouring columns in pairs: both numbers of a group where it has two, else it and the next group's first.
+  // Columns in pairs: both numbers of a group where it has two, else it and the first one of the next group, or, where
+  // there is none, the x of the film and it.
   const std::vector<std::string> names = column_names(method.layout);
   const auto grid = [](Marginal marginal) { return DensityGrid{kBins, kBins, std::move(marginal.density)}; };
   for (const Group group : method.layout.groups()) {
-    const int x = method.layout.column(group), y = x + 1;
-    if (y >= method.layout.dims()) continue;
+    int x = method.layout.column(group), y = x + 1;
+    if (y >= method.layout.dims()) std::tie(x, y) = std::pair(0, x);
+    if (x == y) continue;
     m_data.densities.push_back({method.name, names[static_cast<std::size_t>(x)], names[static_cast<std::size_t>(y)], "",
                                 grid(proposal_marginal(*prepared.proposal, x, y, kBins, kSamples)),
                                 grid(target_marginal(*prepared.candidates, x, y, kBins))});

@@ -1,0 +1,124 @@
+"""Experiments on the Country Kitchen and the White Room, which are read from WARPATH_SCENES."""
+
+import math
+
+from curves import error_charts
+from plot import line_chart
+from tables import column, comparison_table, gain, mean, of_method, write_table
+from tool import compare, folder_of, shared_scene, stored_reference, train
+
+PAPER = {"size": "320x180", "max_depth": 8, "spp": 128, "epp": 16, "runs": 3}
+WARPS_4D = ["uniform:film+bounce1", "kdtree:film+bounce1", "realnvp:film+bounce1", "realnvp:film+bounce1.lobe+bounce1"]
+BOTH = ("country-kitchen", "white-room")
+TWELVE = "film+" + "+".join(f"bounce{k}" for k in range(1, 6))
+
+
+def reference(name):
+    """The stored one, rendered by Mitsuba 3 at the depth of PAPER, or else one of warpath's own."""
+    return stored_reference(f"{name}-d8") or {"reference_spp": 2048}
+
+
+def kitchen():
+    """Country Kitchen, epp-16, 128 spp: plain path tracing, kd-tree, Real NVP in 4D, 5D, 6D and 8D."""
+    deeper = ["uniform:film+bounce1+bounce2", "realnvp:film+bounce1+bounce2", "realnvp:film+bounce1+bounce2+bounce3"]
+    results = compare("kitchen", shared_scene("country-kitchen"), ["none", *WARPS_4D, *deeper], **PAPER, **reference("country-kitchen"))
+    write_table(folder_of("kitchen"), comparison_table(results))
+
+
+def white_room():
+    """The White Room, the same in 4D and 5D."""
+    results = compare("white-room", shared_scene("white-room"), ["none", *WARPS_4D], **PAPER, **reference("white-room"))
+    write_table(folder_of("white-room"), comparison_table(results))
+
+
+def white_room_epp():
+    """More training examples, epp 1, 4, 16 and 64: what each gains on the White Room."""
+    methods, epps, lines, table = WARPS_4D[1:3], (1, 4, 16, 64), {}, []
+    for epp in epps:
+        results = compare(f"white-room-epp/{epp}", shared_scene("white-room"), ["none", WARPS_4D[0], *methods],
+                          **{**PAPER, "epp": epp}, **reference("white-room"))  # fmt: skip
+        rows = comparison_table(results, f"epp-{epp}")
+        table += rows if not table else rows[4:]
+        for method in methods:
+            lines.setdefault(method, []).append((epp, *gain(of_method(results, "none"), of_method(results, method), "mse")))
+    folder = folder_of("white-room-epp")
+    write_table(folder, table)
+    line_chart(folder / "gain.svg", "training set, epp", "gain in MSE over plain path tracing", lines, rule=1)
+
+
+def error_curves():
+    """Error over samples and over time on both scenes, all methods, with error bars over five seeds."""
+    for name in BOTH:
+        results = compare(f"error-curves/{name}", shared_scene(name), ["none", *WARPS_4D[:3], "field"], **{**PAPER, "runs": 5}, **reference(name))
+        folder = folder_of(f"error-curves/{name}")
+        write_table(folder, comparison_table(results))
+        error_charts(folder, results)
+
+
+def published_kdtree():
+    """The kd-tree as Guo et al. describe it: cells split in the middle, dimensions in turn, density by the mean."""
+    for name in BOTH:
+        label = f"published-kdtree/{name}"
+        results = compare(label, shared_scene(name), ["none", "kdtree:film+bounce1"], **PAPER, **reference(name),
+                          kdtree_split="cyclic", kdtree_target="mean")  # fmt: skip
+        write_table(folder_of(label), comparison_table(results))
+
+
+def published_realnvp():
+    """Real NVP trained as published: separate networks, no encoding, batch normalisation, maximum likelihood."""
+    for name in BOTH:
+        label = f"published-realnvp/{name}"
+        results = compare(label, shared_scene(name), ["none", "realnvp:film+bounce1"], **PAPER, **reference(name), loss="likelihood",
+                          networks="separate", encoding_bins=0, masks="alternating", bn="batch", couplings=8, width=64, rate=1e-3)  # fmt: skip
+        write_table(folder_of(label), comparison_table(results))
+
+
+def training_time():
+    """MSE gain over training time on the Country Kitchen, one run a point: Real NVP by steps, kd-tree by candidates."""
+    scene, options = shared_scene("country-kitchen"), {"size": "320x180", "max_depth": 8}
+    measure = {"spp": 64, **reference("country-kitchen")}
+    none = mean(column(compare("training-time/none", scene, ["none"], **options, **measure), "mse"))
+    budgets = [("realnvp", f"{n} steps", {"max_steps": n}) for n in (50, 150, 400, 1000, 3000)]
+    budgets += [("kdtree", f"epp-{k}", {"epp": k}) for k in (0.5, 2, 8, 16, 64)]
+    lines = {"realnvp": [], "kdtree": []}
+    table = ["| warp | budget | CPU seconds of training | gain in MSE |", "|---|---|---|---|"]
+    for family, budget, training in budgets:
+        label = f"training-time/{family}-{budget.replace(' ', '-')}"
+        warp, seconds, _ = train(label, scene, f"{family}:film+bounce1", **options, **training)
+        gained = none / mean(column(compare(label, scene, [warp], **options, **measure), "mse"))
+        lines[family].append((seconds, gained))
+        table.append(f"| {family} | {budget} | {seconds:.1f} | {gained:.2f} |")
+    folder = folder_of("training-time")
+    write_table(folder, table)
+    line_chart(folder / "gain.svg", "CPU seconds of training, candidates included", "gain in MSE over plain path tracing", lines, rule=1)
+
+
+def twelve_dims(epps=(4, 16, 64, 256)):
+    """12D on the kitchen (film and five bounces) with growing training sets: gain, time, and memory against epp-4096's 7 GB.
+
+    The largest set, epp-4096, is not run: its memory and time are told from the line through the others.
+    """
+    scene, options = shared_scene("country-kitchen"), {"size": "320x180", "max_depth": 8}
+    measure = {"spp": 128, "runs": 1, **reference("country-kitchen")}
+    base = compare("twelve-dims/baselines", scene, ["none", f"uniform:{TWELVE}"], **options, **measure)
+    table = ["| training set | CPU seconds of training | peak memory, MB | gain in MSE | over uniform |", "|---|---|---|---|---|"]
+    costs, line = [], []
+    for epp in epps:
+        label = f"twelve-dims/epp-{epp}"
+        warp, seconds, memory = train(label, scene, f"realnvp:{TWELVE}", epp=epp, **options)
+        runs = compare(label, scene, [warp], **options, **measure)
+        over_none, over_uniform = (gain(of_method(base, m), runs, "mse")[0] for m in ("none", f"uniform:{TWELVE}"))
+        costs.append((epp, seconds, memory))
+        line.append((epp, over_none))
+        table.append(f"| epp-{epp} | {seconds:.0f} | {memory / 1e6:.0f} | {over_none:.2f} | {over_uniform:.2f} |")
+    (epp_a, seconds_a, memory_a), (epp_b, seconds_b, memory_b) = costs[0], costs[-1]
+    memory, seconds = (b + (4096 - epp_b) * (b - a) / (epp_b - epp_a) for a, b in ((memory_a, memory_b), (seconds_a, seconds_b)))
+    table.append(f"| epp-4096, not run: by the line through the others | {seconds:.0f} | {memory / 1e6:.0f} | | |")
+    folder = folder_of("twelve-dims")
+    write_table(folder, table)
+    if math.isfinite(memory) and memory > 7e9:
+        print(f"epp-4096 would need {memory / 1e9:.1f} GB, more than 7 GB")
+    line_chart(folder / "gain.svg", "training set, epp", "gain in MSE over plain path tracing", {"realnvp, 12D": line}, rule=1)
+
+
+ALL = (kitchen, white_room, white_room_epp, error_curves, published_kdtree, published_realnvp, training_time, twelve_dims)

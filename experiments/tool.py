@@ -1,0 +1,103 @@
+"""Runs the `warpath` binary for the experiments, and reads what it leaves."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+from dataclasses import dataclass, field
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+@dataclass
+class Settings:
+    """What the command line of experiments/run may set for all experiments."""
+
+    warpath: pathlib.Path = ROOT / "build" / "warpath"
+    out: pathlib.Path = ROOT / "out" / "experiments"
+    overrides: dict = field(default_factory=dict)  # of options, such as {"size": "160x90"}
+
+
+SETTINGS = Settings()
+
+
+def shared_scene(name):
+    """A scene that is not the project's own."""
+    folder = os.environ.get("WARPATH_SCENES")
+    if not folder:
+        sys.exit("set WARPATH_SCENES to the folder that holds country-kitchen/ and white-room/ (docs/results.md says where they are from)")
+    scene = pathlib.Path(folder) / name / "scene.xml"
+    if not scene.exists():
+        sys.exit(f"{scene}: no such scene")
+    return scene
+
+
+def own_scene(name):
+    return ROOT / "scenes" / name / "scene.xml"
+
+
+def stored_reference(name):
+    """Options that name the stored reference image of a shared scene, at 320 x 180; none if it is not there or of another size."""
+    folder = pathlib.Path(os.environ.get("WARPATH_REFERENCES", pathlib.Path(os.environ.get("WARPATH_SCENES", ".")) / ".." / "references"))
+    image = folder / f"{name}.exr"
+    fits = SETTINGS.overrides.get("size", "320x180") == "320x180"
+    return {"reference": image} if fits and image.exists() else {}
+
+
+def arguments(options, fixed=()):
+    """Options as the command line has them: max_depth=8 is --max-depth 8; `defines` are -D. What was set for all comes first,
+    but for what is `fixed`."""
+    words = []
+    for name, value in options.items():
+        if name == "defines":
+            words += [word for key, item in value.items() for word in ("-D", f"{key}={item}")]
+        else:
+            words += [f"--{name.replace('_', '-')}", str(value if name in fixed else SETTINGS.overrides.get(name, value))]
+    everywhere = [key for key in ("seed", "threads", "uniform") if key in SETTINGS.overrides and key not in (*options, *fixed)]
+    return words + [word for key in everywhere for word in (f"--{key}", SETTINGS.overrides[key])]
+
+
+def crop(options, x, y, width, height):
+    """An option that renders a part of the film alone, given in shares of its size."""
+    across, down = (int(n) for n in SETTINGS.overrides.get("size", options["size"]).split("x"))
+    return {"crop": f"{round(x * across)},{round(y * down)},{round(width * across)},{round(height * down)}"}
+
+
+def run(label, *words):
+    """CPU seconds and peak memory in bytes of one call of the binary."""
+    command = [str(SETTINGS.warpath), *map(str, words)]
+    print("$", " ".join(command), file=sys.stderr, flush=True)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit(f"{label}: warpath failed")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+
+
+def folder_of(label):
+    folder = SETTINGS.out / label
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def compare(label, scene, methods, **options):
+    """The runs of `warpath compare`, whose report, images and results.json land in out/experiments/LABEL."""
+    folder = folder_of(label)
+    run(label, "compare", scene, "--methods", ",".join(map(str, methods)), "--report", folder, *arguments(options))
+    with open(folder / "results.json", encoding="utf-8") as file:
+        return json.load(file)["results"]
+
+
+def train(label, scene, warp, **options):
+    """A trained warp's file, CPU seconds (candidates, fitting, loading the scene), peak memory in bytes."""
+    file = folder_of(label) / "trained.warp"
+    return file, *run(label, "train", scene, "--warp", warp, "-o", file, *arguments(options))
+
+
+def render_reference(label, scene, spp, warp="field", **options):
+    """Options that name an image to measure against, for scenes where plain path tracing would take too long to find the light."""
+    image = folder_of(label) / "reference.exr"
+    run(label, "render", scene, "--warp", warp, "-o", image, *arguments({"seed": 999, "spp": spp, **options}, fixed=("seed", "spp", "uniform")))
+    return {"reference": image}
