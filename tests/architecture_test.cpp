@@ -21,9 +21,10 @@ const std::map<std::string, std::set<std::string>> kAllowed{
     {"nn", {"core"}},
     {"warp", {"nn", "core"}},
     {"train", {"warp", "nn", "integrand", "core"}},
+    {"integrate", {"train", "warp", "integrand", "core"}},
     {"estimate", {"warp", "integrand", "tracer", "scene", "core"}},
     {"report", {"core"}},
-    {"cli", {"core", "scene", "tracer", "integrand", "nn", "warp", "train", "estimate", "report"}},
+    {"cli", {"core", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "report"}},
 };
 
 bool is_code(const fs::path& path) { return path.extension() == ".h" || path.extension() == ".cpp"; }

@@ -47,11 +47,14 @@ struct SplineSettings : FlowTraining {
     rate = 1e-2;
     max_steps = 2000;
   }
-  int couplings = 6;
+  int couplings = 6;       ///< with Masks::autoregressive: layers of as many couplings as there are dimensions
   int width = 32;          ///< neurons in a hidden layer, a multiple of 16
   int blocks = 1;          ///< residual blocks of two dense layers in each coupling's network
   int bins = 8;            ///< of each spline, 2 to 64
   int encoding_bins = 32;  ///< of the one-blob encoding of what the networks see [MMRGN19]; 0: the numbers alone
+  /// binary: a coupling moves half of the dimensions, given the others, and the halves change from pair to pair;
+  /// autoregressive: it moves one, given those before it, or, in every other layer, those behind it.
+  enum class Masks { binary, autoregressive } masks = Masks::binary;
 };
 
 struct KdTreeSettings {
@@ -78,6 +81,8 @@ struct GridSettings {
   int bins = 128;  ///< intervals in each dimension
   int iterations = 10;
   double alpha = 0.5;  ///< VEGAS's damping
+  /// Share of z that an interval is given ~ mean of g, or sqrt(E[g^2 / q]), which is VEGAS's and best if known well.
+  enum class Target { mean, second_moment } target = Target::second_moment;
 };
 
 struct TrainSettings {

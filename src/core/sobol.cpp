@@ -40,9 +40,11 @@ ByteTables make_tables() {
   for (int d = 0; d < kSobolDimensions; ++d) {
     const auto v = direction_numbers(d);
     for (unsigned byte = 0; byte < 4; ++byte)
-      for (unsigned value = 0; value < 256; ++value)
-        for (unsigned bit = 0; bit < 8; ++bit)
-          if ((value >> bit) & 1u) tables[static_cast<std::size_t>(d)][byte][value] ^= v[8 * byte + bit];
+      for (unsigned value = 1; value < 256; ++value) {
+        const auto lowest = static_cast<unsigned>(std::countr_zero(value));
+        auto& table = tables[static_cast<std::size_t>(d)][byte];
+        table[value] = table[value & (value - 1)] ^ v[8 * byte + lowest];
+      }
   }
   return tables;
 }

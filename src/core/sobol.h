@@ -5,7 +5,7 @@
 
 namespace warpath {
 
-inline constexpr int kSobolDimensions = 40;
+inline constexpr int kSobolDimensions = 256;
 
 /// Point `index` of the Sobol' sequence in one dimension (0 ... kSobolDimensions - 1), as 32 bits of a binary fraction.
 /// Random access; index 0 is the origin. Direction numbers are Boost's (Joe and Kuo 2003).

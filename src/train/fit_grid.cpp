@@ -12,39 +12,42 @@
 namespace warpath {
 namespace {
 
-constexpr std::size_t kChunks = 64;   // that are summed apart: fixed, so that sums do not depend on threads
-constexpr std::size_t kBatch = 1024;  // rows that go through the map at once
+constexpr std::size_t kChunks = 64;    // that are summed apart: fixed, so that sums do not depend on threads
+constexpr std::size_t kBatch = 1024;   // rows that go through the map at once
+constexpr double kLeastGain = 0.9999;  // iterations end when the second moment falls by less than this factor
 
-/// Sums of g^2 / q, by dimension and interval, and over all.
+/// Sums of what the map should follow, by dimension and interval, and of g^2 / q over all.
 struct Moments {
   Matrix<double> by_bin;
   double all = 0;
 };
 
-Moments second_moments(const Examples& examples, const Grid& grid) {
+Moments moments_under(const Examples& examples, const Grid& grid, GridSettings::Target target) {
   const std::size_t dims = examples.y.cols();
   const auto bins = static_cast<std::size_t>(grid.bins());
   std::vector<Moments> parts(kChunks, {Matrix<double>(dims, bins)});
   tbb::parallel_for(std::size_t{0}, kChunks, [&](std::size_t chunk) {
     Moments& part = parts[chunk];
     const std::size_t begin = examples.size() * chunk / kChunks, end = examples.size() * (chunk + 1) / kChunks;
-    const Scratch<double> y(kBatch * dims), log_q(kBatch), weight(kBatch);
+    const Scratch<double> y(kBatch * dims), log_q(kBatch), weight(kBatch), g(kBatch);
     for (std::size_t i = begin; i < end;) {
       std::size_t rows = 0;
       for (; i < end && rows < kBatch; ++i) {
-        const double g = examples.weight[i];
-        if (!(g > 0)) continue;
+        weight[rows] = examples.weight[i];
+        if (!(weight[rows] > 0)) continue;
         std::copy_n(&examples.y(i, 0), dims, &y[rows * dims]);
-        weight[rows++] = g * g * (examples.inv_q.empty() ? 1.0 : examples.inv_q[i]);
+        g[rows] = weight[rows] / (examples.inv_q.empty() ? 1.0 : examples.inv_q[i]);
+        ++rows;
       }
       const Batch<double> batch(y.data(), rows, dims);
       grid.inverse(batch, batch, {log_q.data(), rows});
       for (std::size_t r = 0; r < rows; ++r) {
-        const double moment = weight[r] * std::exp(-log_q[r]);
+        const double moment = weight[r] * g[r] * std::exp(-log_q[r]);
         part.all += moment;
+        const double part_of_bin = target == GridSettings::Target::mean ? weight[r] : moment;
         for (std::size_t d = 0; d < dims; ++d)
           part.by_bin(d, std::min(static_cast<std::size_t>(batch(r, d) * static_cast<double>(bins)), bins - 1)) +=
-              moment;
+              part_of_bin;
       }
     }
   });
@@ -106,13 +109,14 @@ std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSetting
   std::shared_ptr<const Grid> best = grid;
   double least = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration <= settings.iterations; ++iteration) {
-    const Moments moments = second_moments(examples, *grid);
+    const Moments moments = moments_under(examples, *grid, settings.target);
     if (!(moments.all > 0)) break;
+    const bool gained = moments.all < kLeastGain * least;
     if (moments.all < least) {
       least = moments.all;
       best = grid;
     }
-    if (iteration == settings.iterations) break;
+    if (iteration == settings.iterations || (!gained && settings.target == GridSettings::Target::second_moment)) break;
     Matrix<double> edges(dims, grid->edges().cols());
     for (std::size_t d = 0; d < dims; ++d) {
       const auto row = refined(grid->edges().batch().row(d), moments.by_bin.batch().row(d), settings.alpha);

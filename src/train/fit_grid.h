@@ -7,8 +7,8 @@
 
 namespace warpath {
 
-/// Fits VEGAS's separable map (Lepage 1978) to examples that are weighted by g. One set of examples serves all
-/// iterations: in each, every example counts with g^2 / q of the map so far, as if the map had drawn it. Starts from
+/// Fits VEGAS's separable map (Lepage 1978) to weighted examples. One set of them serves all iterations: in each, every
+/// example counts with g^2 / q of the map so far (or, with Target::mean, g), as if the map had drawn it. Starts from
 /// `init`, or the identity, and hands out the map with the least second moment of g / q. The same for any number of
 /// threads.
 std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSettings& settings,

@@ -21,7 +21,7 @@ constexpr int kMaxDepth = 100;
 constexpr double kFloor = 1e-3;  // least density of a leaf, over the mean one
 
 struct Box {
-  std::array<float, kMaxDims> low{}, high{};
+  std::array<float, KdTree::kMaxDims> low{}, high{};
 };
 
 struct Cell {
@@ -57,9 +57,10 @@ class Grower {
       : m_settings(settings), m_dims(examples.y.cols()), m_uniform(examples.inv_q.empty()) {
     m_total = static_cast<double>(examples.size());
     m_values[0] = std::move(examples.weight);
-    if (settings.target == KdTreeSettings::Target::second_moment)
-      for (float& g : m_values[0]) g *= g;
-    for (std::size_t i = 0; i < examples.inv_q.size(); ++i) m_values[0][i] *= examples.inv_q[i];
+    if (settings.target == KdTreeSettings::Target::second_moment) {
+      for (float& value : m_values[0]) value *= value;
+      for (std::size_t i = 0; i < examples.inv_q.size(); ++i) m_values[0][i] /= examples.inv_q[i];
+    }
     m_rows[0] = std::move(examples.y);
     m_rows[1] = Matrix<float>(m_rows[0].rows(), m_dims);
     m_values[1].resize(m_values[0].size());
@@ -117,7 +118,7 @@ class Grower {
   /// Sums of rows by bins of the cell, `bins` of them in each dimension from `first_dim` to `end_dim`.
   void tally_rows(const Box& box, Range range, int from, std::size_t first_dim, std::size_t end_dim, std::size_t bins,
                   std::vector<Tally>& tallies) const {
-    std::array<float, kMaxDims> scale;
+    std::array<float, KdTree::kMaxDims> scale;
     for (std::size_t d = first_dim; d < end_dim; ++d) scale[d] = static_cast<float>(bins) / (box.high[d] - box.low[d]);
     for (std::size_t i = range.begin; i < range.end; ++i) {
       const float* y = &m_rows[from](i, 0);
@@ -325,7 +326,7 @@ KdTree::Nodes flatten(const Cell& root, std::size_t dims) {
 
 std::shared_ptr<const KdTree> fit_kdtree(Examples examples, const KdTreeSettings& settings) {
   const std::size_t dims = examples.y.cols();
-  WARPATH_CHECK(dims >= 1 && dims <= kMaxDims && examples.size() > 0);
+  WARPATH_CHECK(dims >= 1 && dims <= KdTree::kMaxDims && examples.size() > 0);
   WARPATH_CHECK_EQ(examples.weight.size(), examples.size());
   if (settings.max_leaves < 1 || settings.max_leaves > (1 << 24))
     throw ConfigError(fmt::format("kd-tree: {} leaves at most, not 1 to {}", settings.max_leaves, 1 << 24));

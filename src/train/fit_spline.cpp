@@ -13,8 +13,9 @@ nn::AlignedVector<float> start_from(const Proposal& init, const spline::Flow& fl
   if (!warp) throw ConfigError(fmt::format("a {} cannot start the training of a spline", init.family()));
   const auto text = [](const spline::Flow& f) {
     const SplineSettings& s = f.settings();
-    return fmt::format("{}D, {} couplings x {}, {} blocks, {} bins, {} encoding bins", f.dims(), s.couplings, s.width,
-                       s.blocks, s.bins, s.encoding_bins);
+    const bool binary = s.masks == SplineSettings::Masks::binary;
+    return fmt::format("{}D, {} {} x {}, {} blocks, {} bins, {} encoding bins", f.dims(), s.couplings,
+                       binary ? "couplings" : "autoregressive layers", s.width, s.blocks, s.bins, s.encoding_bins);
   };
   if (text(warp->flow()) != text(flow))
     throw ConfigError(fmt::format("the weights to start from are of a spline flow of {}; this one has {}",

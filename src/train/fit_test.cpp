@@ -153,8 +153,8 @@ TEST(FitKdTree, LearnsFromExamplesOfAnyDensity) {
   for (std::size_t i = 0; i < kCount; ++i) {
     examples.y(i, 0) = static_cast<float>(y(i, 0));
     examples.y(i, 1) = static_cast<float>(y(i, 1));
-    examples.weight[i] = static_cast<float>(f(i, 0));
     examples.inv_q[i] = static_cast<float>(std::exp(-log_q[i]));
+    examples.weight[i] = static_cast<float>(f(i, 0)) * examples.inv_q[i];
   }
   const double uniform = second_moment(integrand, *fit_kdtree(examples_of(integrand, kCount), settings));
   for (const Target target : {Target::mean, Target::second_moment}) {

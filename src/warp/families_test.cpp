@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "warp/chain.h"
 #include "warp/check.h"
 #include "warp/grid.h"
 #include "warp/kdtree.h"
@@ -36,13 +37,13 @@ std::shared_ptr<const Grid> uneven_grid(int dims, int bins) {
 /// last, or one between, so that branches differ in depth.
 std::shared_ptr<const KdTree> random_tree(int dims, std::size_t leaves) {
   struct Box {
-    float y_low[kMaxDims], y_high[kMaxDims], z_low[kMaxDims], z_high[kMaxDims];
+    float y_low[KdTree::kMaxDims], y_high[KdTree::kMaxDims], z_low[KdTree::kMaxDims], z_high[KdTree::kMaxDims];
   };
   Box root;
-  std::fill_n(root.y_low, kMaxDims, 0.0f);
-  std::fill_n(root.z_low, kMaxDims, 0.0f);
-  std::fill_n(root.y_high, kMaxDims, 1.0f);
-  std::fill_n(root.z_high, kMaxDims, 1.0f);
+  std::fill_n(root.y_low, KdTree::kMaxDims, 0.0f);
+  std::fill_n(root.z_low, KdTree::kMaxDims, 0.0f);
+  std::fill_n(root.y_high, KdTree::kMaxDims, 1.0f);
+  std::fill_n(root.z_high, KdTree::kMaxDims, 1.0f);
   std::vector<Box> boxes{root};
   KdTree::Nodes nodes;
   std::size_t inner = 0;
@@ -131,6 +132,38 @@ TEST(Grid, BrokenFilesAreRefused) {
   EXPECT_THROW(load_proposal(file, "a."), FileError);
   file.put<double>("a.edges", {6}, std::vector<double>{0, 0.5, 1, 0, 0.5, 1});
   EXPECT_THROW(load_proposal(file, "a."), FileError);
+}
+
+TEST(Chain, KeepsEveryPromise) {
+  for (const int dims : kDims) {
+    const Chain chain(random_tree(dims, 20), uneven_grid(dims, 37));
+    EXPECT_EQ(check_proposal(chain), "");
+    EXPECT_EQ(check_warp(chain), "");
+    expect_same(chain, *stored_and_loaded(chain));
+  }
+}
+
+TEST(Chain, MultipliesDensities) {
+  const auto inner = uneven_grid(2, 5), outer = uneven_grid(2, 7);
+  Matrix<double> y(1, 2), x(1, 2);
+  y.values() = {0.3, 0.8};
+  std::vector<double> log_outer(1), log_inner(1), log_chain(1);
+  outer->inverse(y.batch(), x.batch(), log_outer);
+  inner->log_density(x.batch(), log_inner);
+  Chain(inner, outer).log_density(y.batch(), log_chain);
+  EXPECT_NEAR(log_chain[0], log_outer[0] + log_inner[0], 1e-12);
+}
+
+TEST(Chain, BrokenFilesAreRefused) {
+  TensorFile file;
+  Chain(uneven_grid(2, 5), uneven_grid(2, 7)).save(file, "a.");
+  TensorFile nested = file, other = file, mixture = file;
+  nested.metadata()["a.inner.family"] = "chain";
+  EXPECT_THROW(load_proposal(nested, "a."), FileError);
+  Grid(3, 4).save(other, "a.inner.");
+  EXPECT_THROW(load_proposal(other, "a."), FileError);
+  mixture_of_all(2)->save(mixture, "a.outer.");
+  EXPECT_THROW(load_proposal(mixture, "a."), FileError) << "a mixture is no bijection";
 }
 
 TEST(KdTree, KeepsEveryPromise) {

@@ -13,6 +13,8 @@ namespace warpath {
 /// and q is the ratio of two volumes, exact in double.
 class KdTree : public Warp {
  public:
+  static constexpr int kMaxDims = 32;
+
   /// Breadth-first; the children of the k-th inner node are the nodes 2k + 1 (below the split) and 2k + 2.
   struct Nodes {
     static constexpr std::uint8_t kLeaf = 255;

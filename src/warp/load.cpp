@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 
+#include "warp/chain.h"
 #include "warp/grid.h"
 #include "warp/kdtree.h"
 #include "warp/mixture.h"
@@ -25,8 +26,9 @@ std::shared_ptr<const Proposal> load_as(const TensorFile& file, const std::strin
 }
 
 constexpr std::array kFamilies{Family{"uniform", load_as<Uniform>}, Family{"grid", load_as<Grid>},
-                               Family{"kdtree", load_as<KdTree>}, Family{"realnvp", load_as<RealNvp>},
-                               Family{"spline", load_as<Spline>}, Family{"mixture", load_as<Mixture>}};
+                               Family{"kdtree", load_as<KdTree>},   Family{"realnvp", load_as<RealNvp>},
+                               Family{"spline", load_as<Spline>},   Family{"chain", load_as<Chain>},
+                               Family{"mixture", load_as<Mixture>}};
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 namespace warpath {
 
-inline constexpr int kMaxDims = 32;  ///< of every proposal
+inline constexpr int kMaxDims = 256;  ///< of every proposal; of a kd-tree KdTree::kMaxDims
 
 /// The proposal that Proposal::save put under `prefix`, of whatever family. Throws FileError if it is unknown or
 /// broken.

@@ -37,6 +37,7 @@ void Spline::save(TensorFile& file, const std::string& prefix) const {
   meta[prefix + "blocks"] = std::to_string(s.blocks);
   meta[prefix + "bins"] = std::to_string(s.bins);
   meta[prefix + "encoding_bins"] = std::to_string(s.encoding_bins);
+  meta[prefix + "masks"] = s.masks == SplineSettings::Masks::binary ? "binary" : "autoregressive";
   save_parameters(file, prefix, m_flow, m_parameters);
 }
 
@@ -48,6 +49,10 @@ std::shared_ptr<const Spline> Spline::load(const TensorFile& file, const std::st
   s.blocks = load_int(file, prefix, "blocks", 0, 100);
   s.bins = load_int(file, prefix, "bins", 2, spline::kMostBins);
   s.encoding_bins = load_int(file, prefix, "encoding_bins", 0, 256);
+  const std::string& masks = file.meta(prefix + "masks");
+  if (masks != "binary" && masks != "autoregressive")
+    fail_load(file, prefix, fmt::format("masks \"{}\", not binary or autoregressive", masks));
+  if (masks == "autoregressive") s.masks = SplineSettings::Masks::autoregressive;
   if (s.width % 16 != 0) fail_load(file, prefix, fmt::format("width {}: not a multiple of 16", s.width));
   spline::Flow flow(dims, s);
   auto parameters = load_parameters(file, prefix, flow);

@@ -22,6 +22,32 @@ T* row(T* rows, int r) {
   return row(rows, static_cast<std::size_t>(r));
 }
 
+/// Which dimensions a coupling sees, and which it moves.
+struct Split {
+  std::vector<int> kept, moved;
+};
+
+std::vector<Split> splits(int dims, const SplineSettings& settings) {
+  std::vector<Split> splits;
+  if (settings.masks == SplineSettings::Masks::binary) {
+    for (int c = 0; c < settings.couplings; ++c) {
+      Split& split = splits.emplace_back();
+      const std::vector<bool> moves = binary_mask(dims, c);
+      for (int i = 0; i < dims; ++i) (moves[static_cast<std::size_t>(i)] ? split.moved : split.kept).push_back(i);
+    }
+    return splits;
+  }
+  // The last coupling is the first that y goes through: it must move the dimension that no other one sees.
+  for (int layer = 0; layer < settings.couplings; ++layer)
+    for (int k = 0; k < dims; ++k) {
+      Split& split = splits.emplace_back();
+      const auto place = [&](int i) { return layer % 2 == 0 ? i : dims - 1 - i; };
+      for (int i = 0; i < k; ++i) split.kept.push_back(place(i));
+      split.moved.push_back(place(k));
+    }
+  return splits;
+}
+
 }  // namespace
 
 Flow::Flow(int dims, const SplineSettings& settings) : m_dims(dims), m_settings(settings) {
@@ -31,10 +57,10 @@ Flow::Flow(int dims, const SplineSettings& settings) : m_dims(dims), m_settings(
   if (settings.encoding_bins < 0)
     throw ConfigError(fmt::format("encoding bins {}: must not be negative", settings.encoding_bins));
   WARPATH_CHECK(dims >= 1);
-  for (int c = 0; c < settings.couplings; ++c) {
+  for (Split& split : splits(dims, settings)) {
     Coupling coupling;
-    const std::vector<bool> moves = binary_mask(dims, c);
-    for (int i = 0; i < dims; ++i) (moves[static_cast<std::size_t>(i)] ? coupling.moved : coupling.kept).push_back(i);
+    coupling.kept = std::move(split.kept);
+    coupling.moved = std::move(split.moved);
     // A single dimension has nothing to be conditioned on: its network has no inputs.
     coupling.net = nn::ResidualNet(static_cast<int>(coupling.kept.size()) * encoded_rows(settings.encoding_bins),
                                    settings.width, settings.blocks,

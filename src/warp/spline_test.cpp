@@ -62,6 +62,15 @@ TEST_P(SplineTest, KeepsEveryPromise) {
   EXPECT_EQ(check_warp(*warp, tolerances()), "");
 }
 
+TEST_P(SplineTest, KeepsEveryPromiseAutoregressive) {
+  SplineSettings settings = small();
+  settings.couplings = GetParam() > 2 ? 1 : 2;
+  settings.masks = SplineSettings::Masks::autoregressive;
+  const auto warp = bent(GetParam(), settings);
+  EXPECT_EQ(check_proposal(*warp, tolerances()), "");
+  EXPECT_EQ(check_warp(*warp, tolerances()), "");
+}
+
 TEST_P(SplineTest, IsTheIdentityUntrained) {
   for (const int bins : {2, 7, 16, 64}) {
     SplineSettings s = small();
@@ -92,14 +101,36 @@ TEST_P(SplineTest, DensityIsFiniteAtTheBorder) {
 }
 
 TEST_P(SplineTest, ComesBackFromAFile) {
-  const auto warp = bent(GetParam(), small());
-  TensorFile file;
-  warp->save(file, "a.");
-  const auto loaded = std::dynamic_pointer_cast<const Spline>(load_proposal(file, "a."));
-  ASSERT_TRUE(loaded);
-  EXPECT_EQ(loaded->parameters(), warp->parameters());
-  EXPECT_EQ(loaded->settings().bins, warp->settings().bins);
-  EXPECT_EQ(loaded->settings().encoding_bins, warp->settings().encoding_bins);
+  for (const auto masks : {SplineSettings::Masks::binary, SplineSettings::Masks::autoregressive}) {
+    SplineSettings settings = small();
+    settings.masks = masks;
+    const auto warp = bent(GetParam(), settings);
+    TensorFile file;
+    warp->save(file, "a.");
+    const auto loaded = std::dynamic_pointer_cast<const Spline>(load_proposal(file, "a."));
+    ASSERT_TRUE(loaded);
+    EXPECT_EQ(loaded->parameters(), warp->parameters());
+    EXPECT_EQ(loaded->settings().bins, warp->settings().bins);
+    EXPECT_EQ(loaded->settings().encoding_bins, warp->settings().encoding_bins);
+    EXPECT_EQ(loaded->settings().masks, masks);
+  }
+}
+
+// A density that factors as q(y_0) q(y_1 | y_0) q(y_2 | y_0, y_1) ...: the number of dimension k depends on those up to
+// k alone.
+TEST(Spline, AutoregressiveMasksLookBack) {
+  SplineSettings settings = small();
+  settings.couplings = 1;
+  settings.masks = SplineSettings::Masks::autoregressive;
+  const auto warp = bent(5, settings);
+  for (std::size_t changed = 0; changed < 5; ++changed) {
+    Matrix<double> y(2, 5), z(2, 5);
+    for (std::size_t d = 0; d < 5; ++d) y(0, d) = y(1, d) = 0.3 + 0.1 * static_cast<double>(d);
+    y(1, changed) = 0.9;
+    std::vector<double> log_det(2);
+    warp->inverse(y.batch(), z.batch(), log_det);
+    for (std::size_t d = 0; d < 5; ++d) EXPECT_EQ(z(0, d) == z(1, d), d < changed) << d << " of " << changed;
+  }
 }
 
 // Weights as wild as can be: bins as narrow and slopes as steep as they get, everywhere.
@@ -158,6 +189,7 @@ TEST(Spline, BrokenFilesAreErrors) {
   broken([](TensorFile& f) { f.metadata()["w.bins"] = "65"; });
   broken([](TensorFile& f) { f.metadata()["w.bins"] = "16"; });
   broken([](TensorFile& f) { f.metadata().erase("w.blocks"); });
+  broken([](TensorFile& f) { f.metadata()["w.masks"] = "some"; });
   broken([](TensorFile& f) {
     const std::vector<float> nan(16, NAN);
     f.put<float>("w.coupling0.layer0.bias", {16}, nan);
