@@ -3,16 +3,19 @@ find_package(Imath REQUIRED)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
-# Debian's OpenImageIO lists the headers of OpenCV, which it needs for itself alone and which need not be installed.
-find_package(OpenImageIO REQUIRED GLOBAL)
-get_target_property(openimageio_includes OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)
-list(FILTER openimageio_includes EXCLUDE REGEX opencv)
-set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${openimageio_includes}")
+if(WARPATH_RENDERER)
+  # Debian's OpenImageIO lists the headers of OpenCV, which it needs for itself alone and which need not be installed.
+  find_package(OpenImageIO REQUIRED GLOBAL)
+  get_target_property(openimageio_includes OpenImageIO::OpenImageIO INTERFACE_INCLUDE_DIRECTORIES)
+  list(FILTER openimageio_includes EXCLUDE REGEX opencv)
+  set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${openimageio_includes}")
+endif()
 
 # What every target compiles with: AVX2 at least, and no fast-math, because NaN and infinity must be seen and counted.
 add_library(warpath_flags INTERFACE)
 # GCC 12 warns of overlaps and overflows that inlined std::string and std::vector code cannot have (GCC bugs 105651, 105762).
 target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -fno-math-errno -fno-trapping-math
+                                               -fno-semantic-interposition
                                                -Wno-restrict -Wno-stringop-overflow)
 
 # warpath_folder(NAME [folders and libraries it may use]... [FOR_TESTS file...])

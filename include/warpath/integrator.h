@@ -99,11 +99,11 @@ class Integrator {
   Integral integrate(const Function& f, const Run& run);
 
   /// Begins an iteration of at most `neval` points, and returns how many it has: a power of two in each replicate.
-  std::size_t begin(std::size_t neval, int integrals = 1);
+  std::size_t begin(std::size_t neval);
   /// Points `first` ... `first + x.rows() - 1`, and their weights 1 / density: the mean of weight * f over all points
   /// estimates the integral.
   void draw(std::size_t first, Batch<double> x, std::span<double> weight) const;
-  /// Takes f of the next points, in their order, with x and weight as draw gave them.
+  /// Takes f of the next points, in their order, with x and weight as draw gave them. f: N x C, always the same C.
   void add(Batch<const double> x, std::span<const double> weight, Batch<const double> f);
   /// Ends the iteration; the warp learns from it if `adapt`.
   Iteration end(bool adapt);
@@ -117,7 +117,8 @@ class Integrator {
 
   /// Bounds and warp as safetensors, atomically. Throws FileError.
   void save(const std::filesystem::path& path) const;
-  /// What save wrote; settings.warp must be its family or `auto`. Throws FileError that says what is wrong.
+  /// What save wrote; settings.warp must be its family, or `auto`: then it is. Throws FileError that says what is
+  /// wrong.
   static Integrator load(const std::filesystem::path& path, IntegratorSettings settings = {});
 
  private:

@@ -11,6 +11,7 @@
 #include "integrate/replicate_sums.h"
 #include "train/flow_optimiser.h"
 #include "warp/load.h"
+#include "warp/mixture.h"
 #include "warp/scratch.h"
 #include "warpath/error.h"
 
@@ -29,6 +30,12 @@ Points::Kind kind_of(const std::string& sampler) {
   throw ConfigError(fmt::format("unknown sampler \"{}\"; known: sobol, independent", sampler));
 }
 
+/// What a proposal learned, apart from what defends it.
+const Proposal& main_component(const Proposal& proposal) {
+  const auto* mixture = dynamic_cast<const Mixture*>(&proposal);
+  return mixture ? *mixture->components().front().proposal : proposal;
+}
+
 /// What the state keeps of the iteration under way.
 struct UnderWay {
   Points points;
@@ -36,8 +43,6 @@ struct UnderWay {
   ReplicateSums sums;
   Examples examples;
   std::size_t taken = 0;
-  std::uint64_t number = 0;
-  int integrals = 0;
 };
 
 }  // namespace
@@ -102,15 +107,11 @@ int Integrator::dims() const { return static_cast<int>(m_state->bounds.size()); 
 std::span<const Interval> Integrator::bounds() const { return m_state->bounds; }
 std::string Integrator::warp() const { return m_state->learner.description(); }
 
-std::size_t Integrator::begin(std::size_t neval, int integrals) {
+std::size_t Integrator::begin(std::size_t neval) {
   if (neval < kLeastNeval) throw ConfigError(fmt::format("neval is {}, not at least {}", neval, kLeastNeval));
-  if (integrals < 1) throw ConfigError(fmt::format("{} integrals; there must be at least 1", integrals));
   auto now = std::make_unique<UnderWay>();
-  now->number = m_state->iterations;
   now->points = m_state->points(neval);
   now->proposal = m_state->learner.proposal(now->points.second_share());
-  now->sums = ReplicateSums(static_cast<std::size_t>(integrals), now->points.replicate_size());
-  now->integrals = integrals;
   const std::size_t count = now->points.count(), rows = std::min(count, m_state->settings.memory);
   now->examples = {Matrix<float>(rows, m_state->bounds.size()), std::vector<float>(rows), std::vector<float>(rows)};
   m_state->under_way = std::move(now);
@@ -128,6 +129,7 @@ void Integrator::add(Batch<const double> x, std::span<const double> weight, Batc
   WARPATH_CHECK_EQ(x.rows(), f.rows());
   WARPATH_CHECK_EQ(weight.size(), f.rows());
   WARPATH_CHECK(now.taken + f.rows() <= now.points.count());
+  if (now.taken == 0) now.sums = ReplicateSums(f.cols(), now.points.replicate_size());
   now.sums.add(f, weight);
   Examples& examples = now.examples;
   for (std::size_t i = 0; i < f.rows() && now.taken + i < examples.size(); ++i) {
@@ -158,10 +160,11 @@ Iteration Integrator::end(bool adapt) {
 
 Integral Integrator::integrate(const Function& f, const Run& run) {
   if (run.nitn < 1) throw ConfigError(fmt::format("{} iterations; there must be at least 1", run.nitn));
+  if (run.integrals < 1) throw ConfigError(fmt::format("{} integrals; there must be at least 1", run.integrals));
   std::vector<Iteration> iterations;
-  const auto dims = m_state->bounds.size(), channels = static_cast<std::size_t>(std::max(run.integrals, 1));
+  const auto dims = m_state->bounds.size(), channels = static_cast<std::size_t>(run.integrals);
   for (int k = 0; k < run.nitn; ++k) {
-    const std::size_t count = begin(run.neval, run.integrals), chunk = std::min(count, kChunk);
+    const std::size_t count = begin(run.neval), chunk = std::min(count, kChunk);
     Matrix<double> x(chunk, dims), values(chunk, channels);
     std::vector<double> weight(chunk);
     for (std::size_t first = 0; first < count; first += chunk) {
@@ -229,6 +232,9 @@ Integrator Integrator::load(const std::filesystem::path& path, IntegratorSetting
   if (proposal->dims() != static_cast<int>(bounds.size()))
     throw FileError(
         fmt::format("{}: {} bounds for a warp of {} dimensions", path.string(), bounds.size(), proposal->dims()));
+  if (const std::string family = main_component(*proposal).family();
+      settings.warp == "auto" && family != "uniform" && family != "grid" && family != "chain")
+    settings.warp = family;
   Integrator integrator(std::move(bounds), std::move(settings));
   integrator.m_state->learner.start_from(std::move(proposal));
   return integrator;

@@ -34,7 +34,8 @@ constexpr int kEpochs = 4;
 // A grid that leaves this share of effective samples is good enough: scrambled points do the rest.
 constexpr double kGoodGrid = 0.75;
 constexpr std::size_t kMostGridNumbers = std::size_t{1} << 24;  // coordinates that a grid learns from
-constexpr int kFlowTries = 3;  // times that a flow may be trained without beating the grid
+constexpr double kFlowGain = 1.01;  // in effective samples from one iteration to the next, to train a flow on
+constexpr int kFlowTries = 3;       // times that a flow may be trained without beating the grid
 
 bool is_flow(const std::string& family) { return family == "spline" || family == "realnvp"; }
 
@@ -58,6 +59,7 @@ void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
   if (const auto* mixture = dynamic_cast<const Mixture*>(proposal.get()))
     proposal = mixture->components().front().proposal;
   if (proposal->family() == "uniform") return;
+  m_learned = 1;
   auto warp = std::dynamic_pointer_cast<const Warp>(proposal);
   if (const auto* chain = dynamic_cast<const Chain*>(warp.get())) {
     m_grid = std::dynamic_pointer_cast<const Grid>(chain->outer());
@@ -106,10 +108,12 @@ void Learner::learn(Examples examples, double variance) {
   ++m_learned;
   const double count = static_cast<double>(examples.size()), share = effective / count;
   if (m_family == "auto") m_grid_done = grid_is_done(share);
+  const bool trained = m_flows > 0 && defended() && share < kFlowGain * m_passes.back().effective_share;
   remember(std::move(examples), share);
 
   const double enough = std::min(kEnough, kEnoughShare * count);
   const bool annealing = effective < enough;
+  if (trained && !annealing) return;
   const bool of_grid = m_grid && !m_grid_done;
   const std::size_t most = of_grid ? kMostGridNumbers / static_cast<std::size_t>(m_dims) : m_memory;
   Examples chosen = annealing ? tempered(m_passes.back().examples, enough) : pooled(most);

@@ -55,7 +55,7 @@ class Learner {
   std::string m_family;
   std::uint64_t m_seed;
   std::size_t m_memory;
-  int m_learned = 0;  ///< iterations
+  int m_learned = 0;  ///< iterations, or 1 for all that a loaded proposal saw
   std::vector<Pass> m_passes;
 
   std::shared_ptr<const Grid> m_grid;  ///< null unless the family has one

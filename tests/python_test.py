@@ -1,0 +1,35 @@
+#!/usr/bin/env python3
+"""Installs the Python package into a virtual environment in the build folder, and runs its tests and the examples in its docstrings.
+
+  python_test.py BUILD SOURCE
+
+Where what it needs cannot be installed it says why and exits with 77: skipped.
+"""
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+build, source = (Path(a).resolve() for a in sys.argv[1:3])
+environment = build / "venv"
+python = environment / "bin" / "python"
+
+
+def pip_install(*arguments):
+    return subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *arguments], capture_output=True, text=True)
+
+
+if not python.exists():
+    venv.create(environment, with_pip=True)
+needed = pip_install("nanobind>=2.4", "scikit-build-core>=0.10", "numpy", "pytest")
+if needed.returncode != 0:
+    print("skipped: what the Python package is built with cannot be installed here:", needed.stderr.strip().splitlines()[-1:])
+    sys.exit(77)
+peer = pip_install("vegas==6.4.1")
+if peer.returncode != 0:
+    print("vegas cannot be installed here, so the test of its decorators is skipped")
+package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python'}", str(source))
+if package.returncode != 0:
+    sys.exit(package.stdout + package.stderr)
+sys.exit(subprocess.run([python, "-m", "pytest", "-rs", source / "python" / "tests", "--pyargs", "warpath", "--doctest-modules", "-p", "no:cacheprovider"],
+                        cwd=build).returncode)
