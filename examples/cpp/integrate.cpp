@@ -1,7 +1,7 @@
 // Two narrow peaks in eight dimensions: adapt, then measure with a warp that no longer changes.
+#include <warpath/integrator.h>
 #include <cmath>
 #include <cstdio>
-#include <warpath/integrator.h>
 
 int main() {
   const auto two_peaks = [](warpath::Batch<const double> x, warpath::Batch<double> f) {
@@ -17,6 +17,6 @@ int main() {
   warpath::Integrator integrator(std::vector<warpath::Interval>(8));
   integrator.integrate(two_peaks, {.nitn = 6, .neval = 50'000});
   const warpath::Integral result = integrator.integrate(two_peaks, {.nitn = 4, .neval = 50'000, .adapt = false});
-  std::printf("%s%s, exactly %.6g\n", result.summary().c_str(), warpath::with_error(result.mean(), result.sdev()).c_str(),
-              2 * std::pow(std::sqrt(M_PI / 100), 8));
+  std::printf("%s%s, exactly %.6g\n", result.summary().c_str(),
+              warpath::with_error(result.mean(), result.sdev()).c_str(), 2 * std::pow(std::sqrt(M_PI / 100), 8));
 }

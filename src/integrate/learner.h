@@ -14,7 +14,7 @@ namespace warpath {
 ///
 /// A first iteration of uniform points may hold a handful that matter. Then what is followed is not |f| but
 /// q^(1 - b) |f|^b, between the density q that drew the points and |f|, with b such that enough of them matter; each
-/// iteration goes on from the last one, and b grows to 1 (annealing, as in sequential Monte Carlo).
+/// iteration goes on from the last one, and b grows to 1 (annealing [Neal01]).
 ///
 /// `auto` refines a grid until that gains little, then puts a spline flow in front of it, unless the grid is good
 /// enough; what measured best draws.

@@ -9,7 +9,7 @@ namespace warpath {
 double effective_samples(std::span<const float> weight);
 
 /// The examples with weights w^b, b in (0, 1] as large as leaves `effective` effective samples: examples of the density
-/// q^(1 - b) g^b, on the way from the q that drew them to g (annealed importance sampling, Neal 2001). Few examples
+/// q^(1 - b) g^b, on the way from the q that drew them to g (annealing, as in [Neal01]). Few examples
 /// that matter teach a density little; on the way there are enough.
 Examples tempered(const Examples& examples, double effective);
 
