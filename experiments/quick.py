@@ -3,7 +3,7 @@
 Each claim compares two ways of doing the same over SEEDS seeds, and holds if the mean advantage of one of them is positive at the level
 CHANCE of a one-sided t-test. So a method that has no advantage passes a claim once in a hundred, and all claims about it far more rarely.
 Seeds are fixed: the outcome changes only with the code. A sound method fails a claim with the probability that the test has too little
-power; docs/results.md tells what that is, measured over other seeds (--seed).
+power; --seed tries other seeds.
 
 Advantages are differences of logarithms of the errors of one seed (the reference's own noise not subtracted, so that they exist) or of
 losses. Bulbs are larger here than in the scenes by default, so that fewer samples suffice.

@@ -41,7 +41,7 @@ def comparison_table(results, extra=None, baseline="none"):
     base = of_method(results, baseline)
     for method in methods_of(results):
         runs = of_method(results, method)
-        uniform = of_method(results, "uniform:" + runs[0]["dims"])
+        uniform = of_method(results, "uniform:" + method.partition(":")[2])
         cells = [f"`{method}`" + (f" {extra}" if extra else ""), str(len(runs))]
         for key in ("mse", "relmse"):
             values = column(runs, key)
