@@ -1,4 +1,5 @@
 import math
+import pathlib
 import warnings
 
 import numpy as np
@@ -188,3 +189,9 @@ def test_measuring_warns_of_iterations_that_disagree():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warpath.Integrator([(0, 1)])(lambda x: x[:, 0], nitn=3, neval=500)
+
+
+def test_types_are_installed():
+    folder = pathlib.Path(warpath.__file__).parent
+    assert (folder / "py.typed").exists()
+    assert "class Integrator" in (folder / "_core.pyi").read_text()

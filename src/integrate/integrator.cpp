@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/interrupt.h"
+#include "core/parallel.h"
 #include "core/rng.h"
 #include "core/tensor_file.h"
 #include "integrate/learner.h"
 #include "integrate/points.h"
 #include "integrate/replicate_sums.h"
-#include "train/flow_optimiser.h"
 #include "warp/load.h"
 #include "warp/mixture.h"
 #include "warp/scratch.h"

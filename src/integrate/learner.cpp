@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "core/log.h"
+#include "core/parallel.h"
 #include "core/rng.h"
 #include "train/fit_grid.h"
 #include "train/fit_kdtree.h"
 #include "train/fit_realnvp.h"
 #include "train/fit_spline.h"
-#include "train/flow_optimiser.h"
 #include "train/tempering.h"
 #include "warp/chain.h"
 #include "warp/kdtree.h"

@@ -1,12 +1,10 @@
 #pragma once
-#include <oneapi/tbb/parallel_for.h>
-
 #include <cstddef>
 #include <functional>
 #include <span>
 #include <vector>
 
-#include "core/floating_point.h"
+#include "core/parallel.h"
 #include "nn/adam.h"
 #include "warp/coupling_flow.h"
 
@@ -24,17 +22,6 @@ struct ExampleBlocks {
   const float* block_weight(std::size_t b) const { return weight.data() + b * nn::kBlock; }
   const float* block_target(std::size_t b) const { return target.data() + b * nn::kBlock; }
 };
-
-/// body(i) for i in [0, count), on all threads, one i at a time, denormals flushed.
-void parallel(std::size_t count, const auto& body) {
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, count, 1),
-      [&](const tbb::blocked_range<std::size_t>& range) {
-        const FlushDenormals flush;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-      },
-      tbb::simple_partitioner());
-}
 
 /// Parameters of a flow on their way down the gradient. All sums have a fixed order: threads change no bit.
 class FlowOptimiser {
