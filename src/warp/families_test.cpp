@@ -113,6 +113,15 @@ TEST(Grid, KeepsEveryPromise) {
     }
 }
 
+TEST(Grid, KeepsEveryPromiseInManyDimensions) {
+  for (const int dims : {96, kMaxDims}) {
+    const auto grid = uneven_grid(dims, 37);
+    EXPECT_EQ(check_warp(*grid), "");
+    EXPECT_EQ(check_warp(Uniform(dims)), "");
+    expect_same(*grid, *stored_and_loaded(*grid));
+  }
+}
+
 TEST(Grid, IsTheIdentityUntrained) {
   const Grid grid(3, 10);
   Matrix<double> z(1, 3), y(1, 3);
