@@ -108,7 +108,8 @@ class Integrator {
   /// Ends the iteration; the warp learns from it if `adapt`.
   Iteration end(bool adapt);
 
-  /// Points that follow the warp, with weights 1 / density: any number, no f, no iteration. Each call has new ones.
+  /// Independent points that follow the warp, with weights 1 / density: any number, no f, no iteration. Each call has
+  /// new ones.
   void sample(Batch<double> x, std::span<double> weight);
   /// weight[i] = 1 / density of x[i], a point within the bounds.
   void weights(Batch<const double> x, std::span<double> weight) const;

@@ -106,7 +106,7 @@ class Integrator:
         return self._core.end(adapt)
 
     def sample(self, n: int) -> Sample:
-        """`n` points that follow the warp, new ones with each call."""
+        """`n` independent points that follow the warp, new ones with each call."""
         x, weight = np.empty((n, self.dims)), np.empty(n)
         self._core.sample(x, weight)
         return Sample(x, weight, 1 / weight)

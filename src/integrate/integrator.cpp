@@ -69,7 +69,9 @@ struct Integrator::State {
     }
   }
 
-  Points points(std::size_t count) { return {kind, settings.seed, iterations++, count, learner.defended()}; }
+  Points points(Points::Kind of_kind, std::size_t count) {
+    return {of_kind, settings.seed, iterations++, count, learner.defended()};
+  }
 
   /// Rows `first` ... of points, by all threads.
   void draw(const Points& points, const Proposal& proposal, std::size_t first, Batch<double> x,
@@ -109,7 +111,7 @@ std::string Integrator::warp() const { return m_state->learner.description(); }
 std::size_t Integrator::begin(std::size_t neval) {
   if (neval < kLeastNeval) throw ConfigError(fmt::format("neval is {}, not at least {}", neval, kLeastNeval));
   auto now = std::make_unique<UnderWay>();
-  now->points = m_state->points(neval);
+  now->points = m_state->points(m_state->kind, neval);
   now->proposal = m_state->learner.proposal(now->points.second_share());
   const std::size_t count = now->points.count(), rows = std::min(count, m_state->settings.memory);
   now->examples = {Matrix<float>(rows, m_state->bounds.size()), std::vector<float>(rows), std::vector<float>(rows)};
@@ -182,20 +184,16 @@ Integral Integrator::integrate(const Function& f, const Run& run) {
 }
 
 void Integrator::sample(Batch<double> x, std::span<double> weight) {
-  // More points than asked for, so that the last replicate is whole.
-  Points points = m_state->points(std::max(x.rows(), kLeastNeval));
-  while (points.count() < x.rows()) {
-    --m_state->iterations;
-    points = m_state->points(points.count() + points.replicate_size() + x.rows());
-  }
-  m_state->draw(points, *m_state->learner.proposal(points.second_share()), 0, x, weight);
+  // Independent ones: any number of them has both components in their right shares, a part of a sequence would not.
+  const Points points = m_state->points(Points::Kind::independent, x.rows());
+  m_state->draw(points, *m_state->learner.proposal(Points::kSecondShare), 0, x, weight);
 }
 
 void Integrator::weights(Batch<const double> x, std::span<double> weight) const {
   const std::size_t dims = m_state->bounds.size();
   WARPATH_CHECK_EQ(x.cols(), dims);
   WARPATH_CHECK_EQ(x.rows(), weight.size());
-  const auto proposal = m_state->learner.proposal(Points(m_state->kind, 0, 0, 1 << 20, true).second_share());
+  const auto proposal = m_state->learner.proposal(Points::kSecondShare);
   parallel((x.rows() + kBatch - 1) / kBatch, [&](std::size_t b) {
     const std::size_t begin = b * kBatch, rows = std::min(kBatch, x.rows() - begin);
     Matrix<double> y(rows, dims);
@@ -213,7 +211,7 @@ void Integrator::save(const std::filesystem::path& path) const {
   for (const Interval& i : m_state->bounds) bounds.insert(bounds.end(), {i.low, i.high});
   file.put<double>("bounds", {static_cast<std::int64_t>(m_state->bounds.size()), 2}, bounds);
   file.metadata()["kind"] = kKind;
-  m_state->learner.proposal(Points(m_state->kind, 0, 0, 1 << 20, true).second_share())->save(file, kPrefix);
+  m_state->learner.proposal(Points::kSecondShare)->save(file, kPrefix);
   file.save(path);
 }
 

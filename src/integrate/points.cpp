@@ -28,7 +28,7 @@ Points::Points(Kind kind, std::uint64_t seed, std::uint64_t iteration, std::size
 
 double Points::second_share() const {
   if (!m_defended) return 0;
-  if (m_kind == Kind::independent) return 1.0 / (kSecond + 1);
+  if (m_kind == Kind::independent) return kSecondShare;
   return static_cast<double>(m_second) / static_cast<double>(replicate_size());
 }
 

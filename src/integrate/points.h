@@ -13,6 +13,7 @@ namespace warpath {
 class Points {
  public:
   enum class Kind { independent, sobol };
+  static constexpr double kSecondShare = 1.0 / 33;  ///< of points, but in sequences of fewer than 32
   Points() = default;
   /// At most `count` points; with `defended` every replicate has points for a second component.
   Points(Kind kind, std::uint64_t seed, std::uint64_t iteration, std::size_t count, bool defended);
