@@ -35,11 +35,14 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   void record(const VertexRecords& records) override {
     const auto& u = records.numbers;
     const auto finite = [](float term) { return std::isfinite(term) ? term : 0.0f; };
-    for (std::size_t i = 0; i < records.lanes.size(); ++i) {
+    const std::size_t n = records.lanes.size();
+    m_cells.resize(std::max(m_cells.size(), n));
+    m_tree->find_cells(records.context, n, m_cells.data());
+    for (std::size_t i = 0; i < n; ++i) {
       Entry entry;
       entry.root_key = FieldTree::root_key(records.context, i);
       entry.at = FieldTree::features(records.context, i);
-      entry.cell = m_tree->cell(entry.root_key, entry.at);
+      entry.cell = m_cells[i];
       const auto kind = static_cast<SurfaceKind>(records.context.kind[i]);
       const bool lit = kind != SurfaceKind::delta && kind != SurfaceKind::null;
       entry.light_bin = lit ? static_cast<std::uint16_t>(m_grids.light.bin(u[0][i], u[1][i], u[2][i])) : kNoBin;
@@ -61,6 +64,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   const bool m_squared;
   const FieldGrids& m_grids;
   const std::shared_ptr<const FieldTree> m_tree;
+  std::vector<std::uint32_t> m_cells;  // of the vertices of one bounce
 };
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
@@ -179,7 +183,7 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
 }
 
 void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
-                               HalfProbability* density) const {
+                               CumulativeProbability* density) const {
   const std::uint32_t count = grid.bins();
   static thread_local std::vector<double> moment, drawn, volume, expected;
   static thread_local std::vector<float> masses;
@@ -216,7 +220,7 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
   m_tree_of_pass = std::make_shared<const FieldTree>(m_tree);
   const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
   const std::size_t light_stored = m_grids.light.stored(), scatter_stored = m_grids.diffuse.stored();
-  std::vector<HalfProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
+  std::vector<CumulativeProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
   tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
     const Cell& cell = m_cells[c];
     fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light,

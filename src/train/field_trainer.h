@@ -53,7 +53,7 @@ class FieldTrainer final : public VertexLearner {
   /// extent2: squared width of the scene. Returns false if all vertices of the cell are in one place.
   bool cut(std::uint32_t cell, double extent2);
   void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
-                   HalfProbability* density) const;
+                   CumulativeProbability* density) const;
 
   FieldSettings m_settings;
   FieldGrids m_grids;

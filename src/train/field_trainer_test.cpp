@@ -96,10 +96,18 @@ TEST(FieldTrainer, DensityGoesWithTheMeanOrTheRootOfTheSecondMoment) {
     settings.target = target;
     const auto field = taught(settings, 100);
     const double mean = 0.25 * value + 0.75;
-    const auto q = [&](float u, float v) { return density(*field, VertexNumbers::scatter, batch, 0, {0.5f, u, v}); };
-    EXPECT_NEAR(q(0.3f, 0.2f), 0.1 + 0.9 * value / mean, 0.1);
-    EXPECT_NEAR(q(0.3f, 0.7f), 0.1 + 0.9 / mean, 0.05);
-    EXPECT_NEAR(q(0.8f, 0.7f), 0.1 + 0.9 / mean, 0.05);
+    // Mean of q over a quarter of the square: bins differ, probabilities are rounded.
+    const auto q = [&](float u0, float v0) {
+      double sum = 0;
+      for (float u = 1 / 32.0f; u < 0.5f; u += 1 / 16.0f)
+        for (float v = 1 / 32.0f; v < 0.5f; v += 1 / 16.0f)
+          sum += density(*field, VertexNumbers::scatter, batch, 0, {0.5f, u0 + u, v0 + v}) / 64;
+      return sum;
+    };
+    // Every node gives up to 16 of its 240 units away evenly.
+    EXPECT_NEAR(q(0.0f, 0.0f), 0.1 + 0.9 * value / mean, 0.15);
+    EXPECT_NEAR(q(0.0f, 0.5f), 0.1 + 0.9 / mean, 0.1);
+    EXPECT_NEAR(q(0.5f, 0.5f), 0.1 + 0.9 / mean, 0.1);
   }
 }
 
@@ -116,7 +124,7 @@ TEST(FieldTrainer, CellsTellPlacesApart) {
     const bool left = batch.floats[0][i] < 0.5f;
     const float low = density(*field, VertexNumbers::light, batch, i, {0.5f, 0.1f, 0.5f});
     const float high = density(*field, VertexNumbers::light, batch, i, {0.5f, 0.8f, 0.5f});
-    EXPECT_TRUE(left ? low > 3 * high : high > 3 * low) << low << " " << high << " at " << batch.floats[0][i];
+    EXPECT_TRUE(left ? low > 2.5f * high : high > 2.5f * low) << low << " " << high << " at " << batch.floats[0][i];
   }
 }
 

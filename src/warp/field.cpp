@@ -34,8 +34,8 @@ FieldGrids::FieldGrids(int parts)
       mixed({2, 3, 3}),
       delta({4, 2, 2}) {}
 
-Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<HalfProbability> light,
-             std::vector<HalfProbability> scatter)
+Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
+             std::vector<CumulativeProbability> scatter)
     : m_tree(std::move(tree)),
       m_grids(std::move(grids)),
       m_kinds(std::move(kinds)),
@@ -46,7 +46,7 @@ Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, s
   WARPATH_CHECK_EQ(m_scatter.size(), m_tree.cells() * m_grids.diffuse.stored());
 }
 
-const HalfProbability* Field::density(VertexNumbers which, std::uint32_t cell) const {
+const CumulativeProbability* Field::density(VertexNumbers which, std::uint32_t cell) const {
   return which == VertexNumbers::light ? m_light.data() + cell * m_grids.light.stored()
                                        : m_scatter.data() + cell * m_grids.diffuse.stored();
 }
@@ -73,9 +73,9 @@ void Field::sample(VertexNumbers which, const VertexContext&, const std::uint32_
       walks[count].start(m_grids.grid(which, m_kinds[cell]), density(which, cell), {z[0][i], z[1][i], z[2][i]});
       vertex[count++] = i;
     }
+    // All grids of `which` are equally deep.
     for (bool more = count > 0; more;) {
-      more = false;
-      for (std::size_t k = 0; k < count; ++k) more |= walks[k].step();
+      for (std::size_t k = 0; k < count; ++k) more = walks[k].step();
     }
     std::array<float, 3> drawn;
     for (std::size_t k = 0; k < count; ++k) {
@@ -110,7 +110,7 @@ void Field::save(TensorFile& file, const std::string& prefix) const {
   for (const SurfaceKind kind : m_kinds) kinds.push_back(static_cast<std::uint8_t>(kind));
   file.put<std::uint8_t>(prefix + "kinds", {cells}, kinds);
   // As 32-bit numbers: the file format has no others that would do.
-  const auto put = [&](const char* name, const std::vector<HalfProbability>& densities, std::size_t stored) {
+  const auto put = [&](const char* name, const std::vector<CumulativeProbability>& densities, std::size_t stored) {
     const std::vector<std::int32_t> values(densities.begin(), densities.end());
     file.put<std::int32_t>(prefix + name, {cells, static_cast<std::int64_t>(stored)}, values);
   };
@@ -140,9 +140,16 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
       fail_load(file, prefix, "its cells and their densities do not fit each other");
     for (const std::int32_t p : values)
       if (p < 0 || p > kWholeProbability) fail_load(file, prefix, "a probability is not in [0,1]");
-    return std::vector<HalfProbability>(values.begin(), values.end());
+    return std::vector<CumulativeProbability>(values.begin(), values.end());
   };
   auto light = densities("light", grids.light.stored()), scatter = densities("scatter", grids.diffuse.stored());
+  for (std::size_t c = 0; c < kinds.size(); ++c) {
+    const auto is_density = [&](const HalvingGrid& grid, const std::vector<CumulativeProbability>& all) {
+      return grid.is_density(std::span(all).subspan(c * grid.stored(), grid.stored()));
+    };
+    if (!is_density(grids.light, light) || !is_density(grids.grid(VertexNumbers::scatter, kinds[c]), scatter))
+      fail_load(file, prefix, "the probabilities of a cell do not add up");
+  }
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
                                  std::move(scatter));
 }

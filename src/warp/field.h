@@ -27,8 +27,8 @@ struct FieldGrids {
 class Field final : public VertexWarp {
  public:
   /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers.
-  Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<HalfProbability> light,
-        std::vector<HalfProbability> scatter);
+  Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
+        std::vector<CumulativeProbability> scatter);
 
   std::string family() const override { return "field"; }
   /// A place is a cell.
@@ -44,12 +44,12 @@ class Field final : public VertexWarp {
   const FieldTree& tree() const { return m_tree; }
 
  private:
-  const HalfProbability* density(VertexNumbers which, std::uint32_t cell) const;
+  const CumulativeProbability* density(VertexNumbers which, std::uint32_t cell) const;
 
   FieldTree m_tree;
   FieldGrids m_grids;
   std::vector<SurfaceKind> m_kinds;  // of each cell
-  std::vector<HalfProbability> m_light, m_scatter;
+  std::vector<CumulativeProbability> m_light, m_scatter;
 };
 
 }  // namespace warpath

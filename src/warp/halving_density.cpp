@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <vector>
 
 #include "warpath/error.h"
@@ -9,29 +10,26 @@
 namespace warpath {
 namespace {
 
-constexpr int kSubtreeLevels = 4;
-constexpr std::uint32_t kSubtree = 1u << kSubtreeLevels;  // numbers of a subtree, the first of which is not used
-
-/// Subtree s has the children 16 s + 1 ... 16 s + 16.
-constexpr std::uint32_t child(std::uint32_t subtree, std::uint32_t leaf) { return subtree * kSubtree + 1 + leaf; }
-
-/// Walks down the tree of halvings and knows where the probability of the node it stands on is stored.
-class Descent {
- public:
-  std::size_t place() const { return m_subtree * kSubtree + m_node; }
-  void go(bool second) {
-    m_node = 2 * m_node + second;
-    if (m_node < kSubtree) return;
-    m_subtree = child(m_subtree, m_node - kSubtree);
-    m_node = 1;
-  }
-
- private:
-  std::uint32_t m_subtree = 0, m_node = 1;
-};
-
 /// The largest float below a positive one.
 float below(float x) { return std::bit_cast<float>(std::bit_cast<std::uint32_t>(x) - 1); }
+
+/// Cumulative probabilities of children with these masses: one unit for each that has some mass, and their share of the
+/// rest, rounded where it ends, so that no error adds up.
+void set_node(std::span<const double> masses, std::span<CumulativeProbability> cumulative) {
+  double sum = 0;
+  int units = 0;
+  for (const double mass : masses) sum += mass, units += mass > 0;
+  std::fill(cumulative.begin(), cumulative.end(), static_cast<CumulativeProbability>(kWholeProbability));
+  if (units == 0) return;
+  const double rest = (kWholeProbability - units) / sum;
+  double reached = 0;
+  int begun = 0;
+  for (std::size_t c = 0; c < masses.size(); ++c) {
+    reached += masses[c] * rest;
+    begun += masses[c] > 0;
+    if (begun < units) cumulative[c] = static_cast<CumulativeProbability>(begun + static_cast<int>(reached + 0.5));
+  }
+}
 
 }  // namespace
 
@@ -50,12 +48,28 @@ HalvingGrid::HalvingGrid(std::array<int, 3> bits, int parts) : m_levels(bits[0] 
       }
     }
   }
-  std::size_t subtrees = 0;
-  for (int level = 0; level < m_levels; level += kSubtreeLevels) subtrees += std::size_t{1} << level;
-  m_stored = subtrees * kSubtree;
+  std::uint32_t nodes = 0;
+  std::array<int, 3> left = bits;
+  for (int level = 0; level < m_levels; level += kNodeLevels) {
+    Rank& rank = m_ranks[m_depth];
+    rank.first = nodes;
+    rank.levels = static_cast<std::uint32_t>(std::min(kNodeLevels, m_levels - level));
+    rank.driver = (m_depth + 1) % 3;
+    for (std::uint32_t k = 0; k < rank.levels; ++k) {
+      const std::size_t a = m_axis[static_cast<std::size_t>(level) + k];
+      --left[a];
+      for (std::uint32_t c = 0; c < 1u << rank.levels; ++c)
+        rank.place[c][a] |= (c >> (rank.levels - 1 - k) & 1) << left[a];
+    }
+    nodes += 1u << level;
+    ++m_depth;
+  }
+  m_stored = std::size_t{nodes} * kChildren;
   m_scale = {static_cast<float>(m_parts), static_cast<float>(1 << bits[1]), static_cast<float>(1 << bits[2])};
   for (std::size_t a = 0; a < 3; ++a) m_unit[a] = 1 / static_cast<double>(m_scale[a]);
-  m_volume = static_cast<float>(m_unit[0] * m_unit[1] * m_unit[2]);
+  const double volume = m_unit[0] * m_unit[1] * m_unit[2];
+  m_volume = static_cast<float>(volume);
+  m_whole = volume * std::pow(kWholeProbability, m_depth);
 }
 
 std::uint32_t HalvingGrid::part_of(std::uint32_t bin) const { return bin >> (m_levels - m_bits[0]); }
@@ -74,72 +88,85 @@ std::uint32_t HalvingGrid::bin(float y0, float y1, float y2) const {
   return bin;
 }
 
-void HalvingGrid::set_density(std::span<const float> masses, HalfProbability* density) const {
+std::uint32_t HalvingGrid::node_above(std::uint32_t bin, std::uint32_t depth) const {
+  return m_ranks[depth].first + (bin >> (m_levels - kNodeLevels * static_cast<int>(depth)));
+}
+
+std::uint32_t HalvingGrid::child_above(std::uint32_t bin, std::uint32_t depth) const {
+  const std::uint32_t levels = m_ranks[depth].levels;
+  const int below = m_levels - kNodeLevels * static_cast<int>(depth) - static_cast<int>(levels);
+  return bin >> below & ((1u << levels) - 1);
+}
+
+void HalvingGrid::set_density(std::span<const float> masses, CumulativeProbability* density) const {
   static thread_local std::vector<double> mass;
   const std::uint32_t count = bins();
   mass.resize(2 * count);
   std::copy(masses.begin(), masses.end(), mass.begin() + count);
   for (std::uint32_t node = count - 1; node > 0; --node) mass[node] = mass[2 * node] + mass[2 * node + 1];
-  std::fill_n(density, m_stored, HalfProbability{0});
-  for (int level = 0; level < m_levels; ++level)
-    for (std::uint32_t node = 1u << level; node < 2u << level; ++node) {
-      Descent walk;
-      for (int k = level - 1; k >= 0; --k) walk.go(node >> k & 1);
-      const double first = mass[2 * node], second = mass[2 * node + 1];
-      int p = kWholeProbability / 2;
-      if (second == 0 && first > 0) p = kWholeProbability;
-      if (first == 0 && second > 0) p = 0;
-      if (first > 0 && second > 0)
-        p = std::clamp(static_cast<int>(first / (first + second) * kWholeProbability + 0.5), 1, kWholeProbability - 1);
-      density[walk.place()] = static_cast<HalfProbability>(p);
-    }
+  for (std::uint32_t depth = 0; depth < m_depth; ++depth) {
+    const std::uint32_t nodes = 1u << (kNodeLevels * depth), children = 1u << m_ranks[depth].levels;
+    for (std::uint32_t i = 0; i < nodes; ++i)
+      set_node(std::span(mass).subspan((nodes + i) * children, children),
+               {density + (m_ranks[depth].first + i) * kChildren, kChildren});
+  }
 }
 
-void HalvingGrid::Walk::start(const HalvingGrid& grid, const HalfProbability* density, const std::array<double, 3>& z) {
+bool HalvingGrid::is_density(std::span<const CumulativeProbability> numbers) const {
+  if (numbers.size() != m_stored) return false;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] < (i % kChildren ? numbers[i - 1] : 0)) return false;
+    if (i % kChildren == kChildren - 1 && numbers[i] != kWholeProbability) return false;
+  }
+  // A child that is not there has no bin.
+  for (std::uint32_t b = 0; b < bins(); ++b)
+    if (volume(b) == 0 && inverse_density(numbers.data(), b) < HUGE_VALF) return false;
+  return true;
+}
+
+void HalvingGrid::Walk::start(const HalvingGrid& grid, const CumulativeProbability* density,
+                              const std::array<double, 3>& z) {
   m_grid = &grid;
   m_density = density;
-  m_offset = z;
-  m_width = {1, 1, 1};
+  m_z = z;
   m_place = {};
-  m_subtree = 0;
-  m_level = 0;
+  m_probability = 1;
+  m_node = 0;
+  m_depth = 0;
   __builtin_prefetch(density);
 }
 
 bool HalvingGrid::Walk::step() {
-  const HalfProbability* subtree = m_density + m_subtree * kSubtree;
-  const int end = std::min(m_level + kSubtreeLevels, m_grid->m_levels);
-  std::uint32_t node = 1;
-  for (; m_level < end; ++m_level) {
-    const std::size_t a = m_grid->m_axis[static_cast<std::size_t>(m_level)];
-    const int p = subtree[node];
-    const double first = p * (1.0 / kWholeProbability) * m_width[a];
-    // A whole leaves no second half, whatever rounding did to the offset. No branches: they could not be predicted.
-    const bool second = (m_offset[a] >= first) & (p < kWholeProbability);
-    const double is_second = second;
-    m_offset[a] -= is_second * first;
-    m_width[a] = first + is_second * (m_width[a] - 2 * first);
-    m_place[a] = 2 * m_place[a] + second;
-    node = 2 * node + second;
-  }
-  if (m_level == m_grid->m_levels) return false;
-  m_subtree = child(m_subtree, node - kSubtree);
-  __builtin_prefetch(m_density + m_subtree * kSubtree);
+  const Rank& rank = m_grid->m_ranks[m_depth];
+  const CumulativeProbability* cumulative = m_density + m_node * kChildren;
+  const double reached = m_z[rank.driver] * kWholeProbability;
+  const auto unit = static_cast<CumulativeProbability>(std::min(static_cast<int>(reached), kWholeProbability - 1));
+  CumulativeProbability passed = 0;  // children that end at or before it
+  for (std::uint32_t c = 0; c < kChildren; ++c)
+    passed = static_cast<CumulativeProbability>(passed + (unit >= cumulative[c]));
+  const auto child = static_cast<std::uint32_t>(passed);
+  const int begin = child > 0 ? cumulative[child - 1] : 0, width = cumulative[child] - begin;
+  m_z[rank.driver] = (reached - begin) / width;
+  m_probability *= width;
+  for (std::size_t a = 0; a < 3; ++a) m_place[a] += rank.place[child][a];
+  if (++m_depth == m_grid->m_depth) return false;
+  m_node = m_grid->m_ranks[m_depth].first + (m_node - rank.first) * kChildren + child;
+  __builtin_prefetch(m_density + m_node * kChildren);
   return true;
 }
 
 float HalvingGrid::Walk::finish(std::array<float, 3>& y) const {
   for (std::size_t a = 0; a < 3; ++a) {
-    const double within = m_width[a] > 0 ? std::min(m_offset[a] / m_width[a], 1.0) : 0.5, unit = m_grid->m_unit[a];
+    const double unit = m_grid->m_unit[a];
     // The last float below the bin's end: the sample must not leave the bin whose density it is divided by.
     const float begin = static_cast<float>(m_place[a] * unit);
     const float end = static_cast<float>((m_place[a] + 1) * unit);
-    y[a] = std::clamp(static_cast<float>((m_place[a] + within) * unit), begin, below(end));
+    y[a] = std::clamp(static_cast<float>((m_place[a] + m_z[a]) * unit), begin, below(end));
   }
-  return static_cast<float>(m_grid->m_volume / (m_width[0] * m_width[1] * m_width[2]));
+  return static_cast<float>(m_grid->m_whole / m_probability);
 }
 
-float HalvingGrid::sample(const HalfProbability* density, const std::array<double, 3>& z,
+float HalvingGrid::sample(const CumulativeProbability* density, const std::array<double, 3>& z,
                           std::array<float, 3>& y) const {
   Walk walk;
   walk.start(*this, density, z);
@@ -148,16 +175,14 @@ float HalvingGrid::sample(const HalfProbability* density, const std::array<doubl
   return walk.finish(y);
 }
 
-float HalvingGrid::inverse_density(const HalfProbability* density, std::uint32_t bin) const {
-  double q = 1;
-  Descent walk;
-  for (int level = m_levels - 1; level >= 0; --level) {
-    const bool second = bin >> level & 1;
-    const double p = density[walk.place()] * (1.0 / kWholeProbability);
-    q *= second ? 1 - p : p;
-    walk.go(second);
+float HalvingGrid::inverse_density(const CumulativeProbability* density, std::uint32_t bin) const {
+  double probability = 1;
+  for (std::uint32_t depth = 0; depth < m_depth; ++depth) {
+    const CumulativeProbability* cumulative = density + node_above(bin, depth) * kChildren;
+    const std::uint32_t child = child_above(bin, depth);
+    probability *= cumulative[child] - (child > 0 ? cumulative[child - 1] : 0);
   }
-  return static_cast<float>(m_volume / q);
+  return static_cast<float>(m_whole / probability);
 }
 
 }  // namespace warpath

@@ -44,15 +44,33 @@ TEST(HalvingGrid, PartsOfTheFirstNumberAreWholeBins) {
   }
 }
 
+TEST(HalvingGrid, DensityFollowsTheMasses) {
+  for (const auto& [bits, parts] : kCases) {
+    const HalvingGrid grid(bits, parts);
+    const std::vector<float> mass = masses(grid);
+    std::vector<CumulativeProbability> density(grid.stored());
+    grid.set_density(mass, density.data());
+    double total = 0, whole = 0, apart = 0;
+    for (const float m : mass) total += m;
+    for (std::uint32_t b = 0; b < grid.bins(); ++b) {
+      const double probability = grid.volume(b) / grid.inverse_density(density.data(), b);
+      EXPECT_EQ(probability > 0, mass[b] > 0);
+      whole += probability;
+      apart += std::fabs(probability - mass[b] / total) / 2;
+    }
+    EXPECT_NEAR(whole, 1, 1e-5);
+    // A node gives up to 16 of its 240 units away evenly, and there are two or three on the way to a bin.
+    EXPECT_LT(apart, 0.1);
+  }
+}
+
 TEST(HalvingGrid, SamplesFallWhereTheDensitySaysAndTellIt) {
   constexpr int kSamples = 1 << 18;
   for (const auto& [bits, parts] : kCases) {
     const HalvingGrid grid(bits, parts);
     const std::vector<float> mass = masses(grid);
-    std::vector<HalfProbability> density(grid.stored());
+    std::vector<CumulativeProbability> density(grid.stored());
     grid.set_density(mass, density.data());
-    double total = 0;
-    for (const float m : mass) total += m;
     std::vector<int> hits(grid.bins());
     for (int i = 0; i < kSamples; ++i) {
       const std::uint64_t key = sample_key(3, static_cast<std::uint64_t>(i));
@@ -63,14 +81,11 @@ TEST(HalvingGrid, SamplesFallWhereTheDensitySaysAndTellIt) {
       const std::uint32_t bin = grid.bin(y[0], y[1], y[2]);
       ASSERT_GT(mass[bin], 0);
       ++hits[bin];
-      // q = mass of the bin over its volume.
-      const double expected = grid.volume(bin) * total / mass[bin];
-      ASSERT_NEAR(inv_q / expected, 1, mass[bin] > 1e-3 * total ? 0.02 : 1);
       ASSERT_NEAR(grid.inverse_density(density.data(), bin) / inv_q, 1, 1e-4);
     }
     double chi2 = 0, dof = -1;
     for (std::uint32_t b = 0; b < grid.bins(); ++b) {
-      const double expected = kSamples * mass[b] / total;
+      const double expected = kSamples * grid.volume(b) / grid.inverse_density(density.data(), b);
       if (expected < 5) continue;
       chi2 += (hits[b] - expected) * (hits[b] - expected) / expected;
       dof += 1;
@@ -80,10 +95,33 @@ TEST(HalvingGrid, SamplesFallWhereTheDensitySaysAndTellIt) {
   }
 }
 
+TEST(HalvingGrid, SamplesAreUniformWithinABin) {
+  // What is left of a latent places the sample: in each number of the largest bin, halves are hit equally often.
+  constexpr int kSamples = 1 << 16;
+  for (const auto& [bits, parts] : kCases) {
+    const HalvingGrid grid(bits, parts);
+    std::vector<float> mass(grid.bins(), 0.0f);
+    mass[0] = 1;
+    std::vector<CumulativeProbability> density(grid.stored());
+    grid.set_density(mass, density.data());
+    const double scale[3] = {parts > 0 ? double(parts) : double(1 << bits[0]), double(1 << bits[1]),
+                             double(1 << bits[2])};
+    std::array<int, 3> upper{};
+    for (int i = 0; i < kSamples; ++i) {
+      const std::uint64_t key = sample_key(4, static_cast<std::uint64_t>(i));
+      std::array<float, 3> y;
+      grid.sample(density.data(), {sample_double(key, 0), sample_double(key, 1), sample_double(key, 2)}, y);
+      for (std::size_t a = 0; a < 3; ++a) upper[a] += y[a] * scale[a] >= 0.5;
+    }
+    // 5 standard deviations of a binomial variable; 15 of them: one false alarm in 10^5.
+    for (const int n : upper) EXPECT_NEAR(n, kSamples / 2, 5 * std::sqrt(kSamples / 4.0));
+  }
+}
+
 TEST(HalvingGrid, LatentsAtTheEdgesStayInside) {
   const HalvingGrid grid({2, 3, 3});
   std::vector<float> mass(grid.bins());
-  std::vector<HalfProbability> density(grid.stored());
+  std::vector<CumulativeProbability> density(grid.stored());
   mass[grid.bins() - 1] = 1;  // all in the last bin
   grid.set_density(mass, density.data());
   constexpr double kAlmostOne = 0x1.fffffffffffffp-1;
@@ -94,19 +132,41 @@ TEST(HalvingGrid, LatentsAtTheEdgesStayInside) {
   }
 }
 
-TEST(HalvingGrid, UniformMassesLeaveLatentsAsTheyAre) {
-  const HalvingGrid grid({2, 2, 2}, 3);
-  std::vector<float> mass;
-  std::vector<HalfProbability> density(grid.stored());
-  for (std::uint32_t b = 0; b < grid.bins(); ++b) mass.push_back(grid.volume(b));
-  grid.set_density(mass, density.data());
-  for (int i = 0; i < 100; ++i) {
-    const std::array<double, 3> z{sample_double(5, 3 * i), sample_double(5, 3 * i + 1), sample_double(5, 3 * i + 2)};
-    std::array<float, 3> y;
-    // A third is not a whole number of units of probability.
-    EXPECT_NEAR(grid.sample(density.data(), z, y), 1, 1e-4);
-    for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(y[a], z[a], 1e-4);
+TEST(HalvingGrid, UniformMassesAreNearlyUniform) {
+  for (const auto& [bits, parts] : kCases) {
+    const HalvingGrid grid(bits, parts);
+    std::vector<float> mass;
+    std::vector<CumulativeProbability> density(grid.stored());
+    for (std::uint32_t b = 0; b < grid.bins(); ++b) mass.push_back(grid.volume(b));
+    grid.set_density(mass, density.data());
+    // Equal children get whole units; parts that do not fill their nodes are rounded.
+    for (std::uint32_t b = 0; b < grid.bins(); ++b)
+      if (grid.volume(b) > 0) {
+        EXPECT_NEAR(grid.inverse_density(density.data(), b), 1, parts > 1 ? 0.15 : 1e-6);
+      }
   }
+}
+
+TEST(HalvingGrid, KnowsADensityFromOtherNumbers) {
+  for (const auto& [bits, parts] : kCases) {
+    const HalvingGrid grid(bits, parts);
+    std::vector<CumulativeProbability> density(grid.stored());
+    grid.set_density(masses(grid), density.data());
+    EXPECT_TRUE(grid.is_density(density));
+    EXPECT_FALSE(grid.is_density(std::span(density).first(density.size() - 1)));
+    auto broken = density;
+    broken[15] -= 1;  // not whole
+    EXPECT_FALSE(grid.is_density(broken));
+    broken = density;
+    broken[3] = static_cast<CumulativeProbability>(broken[4] + 1);  // falls
+    EXPECT_FALSE(grid.is_density(broken));
+  }
+  const HalvingGrid grid({2, 0, 0}, 3);  // the fourth child does not exist
+  std::vector<CumulativeProbability> numbers(grid.stored(), static_cast<CumulativeProbability>(kWholeProbability));
+  numbers[0] = 50, numbers[1] = 100;
+  EXPECT_TRUE(grid.is_density(numbers));
+  numbers[2] = 150;
+  EXPECT_FALSE(grid.is_density(numbers));
 }
 
 }  // namespace
