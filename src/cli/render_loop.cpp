@@ -17,30 +17,41 @@ namespace {
 double seconds_since(Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); }
 
 /// What a path costs with a warp at its vertices, over what one costs without, by count of operations: looking a vertex
-/// up and two densities, against two rays, a BSDF and a light.
-constexpr double kVertexWarpCost = 1.35;
+/// up, two densities, what half of the paths teach, and longer paths with more light to look for, against two rays, a
+/// BSDF and a light.
+constexpr double kVertexWarpCost = 1.45;
 /// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
 constexpr int kTrialSpp = 8;
+/// The pass that begins here is drawn uniformly and teaches nothing where costs are measured: that is what a path costs
+/// without a warp.
+constexpr int kPlainCostSpp = 2;
 
 /// How `auto` chooses between uniform numbers and the warp at vertices: error of one sample times its cost, of the last
 /// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp.
 class Trial {
  public:
   /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
-  Trial(bool by_clock) : m_by_clock(by_clock) {}
+  explicit Trial(bool by_clock) : m_by_clock(by_clock) {}
 
   /// Whether the pass that begins at `done` samples per pixel is still drawn uniformly.
   static bool is_plain(int done) { return done < kTrialSpp; }
+  /// Whether it teaches the warp.
+  bool teaches(int done) const { return !m_by_clock || done != kPlainCostSpp; }
   void judge(const ImageEstimator& estimator, int before, double seconds_per_spp, Guide& guide) {
     const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
     if (is_plain(before)) {
-      m_plain = error * (m_by_clock ? seconds_per_spp : 1);
+      m_plain_error = error;
+      if (before == kPlainCostSpp) m_plain_seconds = seconds_per_spp;
+      m_teaching_seconds = std::max(0.0, seconds_per_spp - m_plain_seconds);
       return;
     }
-    const double warped = error * (m_by_clock ? seconds_per_spp : kVertexWarpCost), gain = m_plain / warped;
+    // Passes double, and the last one teaches nothing: half of all paths do.
+    const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
+    const double gain = m_plain_error / (error * cost);
     const bool pays = !(gain < 1);
-    guide.choice = fmt::format("{}: error times cost is {:.2f} x less with a field at every vertex",
-                               pays ? "field" : "plain path tracing", gain);
+    guide.choice = fmt::format(
+        "{}: error times cost is {:.2f} x less with a field at every vertex, whose paths cost {:.2f} x more",
+        pays ? "field" : "plain path tracing", gain, cost);
     log::info("auto: {}", guide.choice);
     if (!pays) {
       guide.warp = nullptr;
@@ -51,14 +62,14 @@ class Trial {
 
  private:
   bool m_by_clock;
-  double m_plain = 0;
+  double m_plain_error = 0, m_plain_seconds = 0, m_teaching_seconds = 0;
 };
 
 /// One pass; what it teaches goes into the guide if another is to follow.
-void add_pass(ImageEstimator& estimator, int spp, bool warped, bool last, Guide& guide, const Progress& progress,
+void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, Guide& guide, const Progress& progress,
               const std::function<bool()>& stop) {
   if (guide.empty()) return estimator.add_pass(spp, progress, stop);
-  const bool learns = guide.trainer && (guide.keep || !last);
+  const bool learns = guide.trainer && teaches;
   const std::uint64_t before = estimator.cost().samples;
   estimator.add_guided_pass(
       spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
@@ -102,7 +113,8 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
     };
     const auto stop = [&] { return budget.deadline && before > 0 && Clock::now() > *budget.deadline; };
     const auto start = Clock::now();
-    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), last, guide, report, stop);
+    const bool teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
+    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), teaches, guide, report, stop);
     per_spp = seconds_since(start) / next;
     if (guide.automatic && !g_interrupted) trial.judge(estimator, before, per_spp, guide);
     done += next;
