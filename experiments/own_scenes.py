@@ -5,7 +5,7 @@ import math
 from curves import error_charts
 from pictures import densities_of, images_of, side_by_side, stacked, write_png
 from plot import line_chart
-from tables import column, comparison_table, gain, mean, of_method, write_table
+from tables import column, comparison_table, gain, mean, of_method, rows_of, write_table
 from tool import compare, crop, folder_of, own_scene, render_reference, train
 
 FILM = {"size": "320x180", "max_depth": 6}
@@ -20,7 +20,7 @@ def coins(epps=(1, 4, 64)):
     table, lines, everything = comparison_table(base), {}, list(base)
     for epp in epps:
         results = compare(f"coins/epp-{epp}", scene, WARPS_4D, **options, examples=epp * 100 * 100, **against)
-        table += comparison_table(base + results, f"epp-{epp}")[4:]
+        table += rows_of(results, base, f"epp-{epp}")
         for method in WARPS_4D:
             lines.setdefault(method, []).append((epp, *gain(of_method(base, "none"), of_method(results, method), "mse")))
         everything += [{**run, "method": f"{run['method']}, epp-{epp}"} for run in results if run["family"] == "realnvp"]

@@ -4,7 +4,7 @@ import math
 
 from curves import error_charts
 from plot import line_chart
-from tables import column, comparison_table, gain, mean, of_method, write_table
+from tables import column, comparison_table, gain, mean, of_method, rows_of, write_table
 from tool import compare, folder_of, shared_scene, stored_reference, train
 
 PAPER = {"size": "320x180", "max_depth": 8, "spp": 128, "epp": 16, "runs": 3}
@@ -33,23 +33,24 @@ def white_room():
 
 def white_room_epp():
     """More training examples, epp 1, 4, 16 and 64: what each gains on the White Room."""
-    methods, epps, lines, table = WARPS_4D[1:3], (1, 4, 16, 64), {}, []
-    for epp in epps:
-        results = compare(f"white-room-epp/{epp}", shared_scene("white-room"), ["none", WARPS_4D[0], *methods],
-                          **{**PAPER, "epp": epp}, **reference("white-room"))  # fmt: skip
-        rows = comparison_table(results, f"epp-{epp}")
-        table += rows if not table else rows[4:]
+    scene, methods, options, lines = shared_scene("white-room"), WARPS_4D[1:3], {**PAPER, "spp": 64, **reference("white-room")}, {}
+    del options["epp"]
+    base = compare("white-room-epp/baselines", scene, ["none", WARPS_4D[0]], **options)
+    table = comparison_table(base)
+    for epp in (1, 4, 16, 64):
+        results = compare(f"white-room-epp/{epp}", scene, methods, epp=epp, **options)
+        table += rows_of(results, base, f"epp-{epp}")
         for method in methods:
-            lines.setdefault(method, []).append((epp, *gain(of_method(results, "none"), of_method(results, method), "mse")))
+            lines.setdefault(method, []).append((epp, *gain(of_method(base, "none"), of_method(results, method), "mse")))
     folder = folder_of("white-room-epp")
     write_table(folder, table)
     line_chart(folder / "gain.svg", "training set, epp", "gain in MSE over plain path tracing", lines, rule=1)
 
 
 def error_curves():
-    """Error over samples and over time on both scenes, all methods, with error bars over five seeds."""
+    """Error over samples and over CPU time on both scenes, with error bars over the seeds; the field too, which learns while it renders."""
     for name in BOTH:
-        results = compare(f"error-curves/{name}", shared_scene(name), ["none", *WARPS_4D[:3], "field"], **{**PAPER, "runs": 5}, **reference(name))
+        results = compare(f"error-curves/{name}", shared_scene(name), ["none", *WARPS_4D[:3], "field"], **PAPER, objective="mse", **reference(name))
         folder = folder_of(f"error-curves/{name}")
         write_table(folder, comparison_table(results))
         error_charts(folder, results)

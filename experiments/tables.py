@@ -35,13 +35,30 @@ def gain(baseline, runs, key):
     return ratio, abs(ratio) * math.hypot(standard_error(a) / mean(a), standard_error(b) / mean(b))
 
 
-def comparison_table(results, extra=None, baseline="none"):
-    """Markdown rows for each method: errors, gains over the baseline and over `uniform` of the same numbers, seconds."""
-    lines = ["| method | runs | MSE | gain | over uniform | relMSE | gain | candidates s | training s | warping s | tracing s |", "|" + "---|" * 11]
-    base = of_method(results, baseline)
+def equal_time_gain(baseline, runs, key):
+    """The same at equal time: error times CPU seconds, training included. The baseline's error falls as one over its time, so this is
+    its error after as many seconds as the method took, over the method's; and other work on the machine does not count."""
+    of_time = [[{"cost": run[key] * run["total_cpu_seconds"]} for run in some] for some in (baseline, runs)]
+    return gain(*of_time, "cost")
+
+
+PHASES = ("candidate", "train", "warp", "trace")
+
+
+def comparison_table(results, baseline="none"):
+    """Markdown: for each method errors, gains over the baseline (equal samples, equal time) and over `uniform` of the same numbers,
+    CPU seconds of each phase."""
+    lines = ["| method | runs | MSE | gain | over uniform | at equal time | relMSE | gain | at equal time | candidates | training | warping | tracing |",
+             "|" + "---|" * 13]  # fmt: skip
+    return lines + rows_of(results, results, baseline=baseline)
+
+
+def rows_of(results, baselines, extra=None, baseline="none"):
+    """Rows of that table, for results that were measured apart from the baselines; `extra` stands beside the method."""
+    lines, base = [], of_method(baselines, baseline)
     for method in methods_of(results):
         runs = of_method(results, method)
-        uniform = of_method(results, "uniform:" + method.partition(":")[2])
+        uniform = of_method(baselines, "uniform:" + method.partition(":")[2])
         cells = [f"`{method}`" + (f" {extra}" if extra else ""), str(len(runs))]
         for key in ("mse", "relmse"):
             values = column(runs, key)
@@ -49,7 +66,8 @@ def comparison_table(results, extra=None, baseline="none"):
             cells.append("{:.2f} ± {:.2f}".format(*gain(base, runs, key)))
             if key == "mse":
                 cells.append("{:.2f} ± {:.2f}".format(*gain(uniform, runs, key)) if uniform else "")
-        cells += [f"{mean(column(runs, f'{part}_seconds')):.1f}" for part in ("candidate", "train", "warp", "trace")]
+            cells.append(f"{equal_time_gain(base, runs, key)[0]:.2f}")
+        cells += [f"{mean(column(runs, f'{phase}_cpu_seconds')):.1f}" for phase in PHASES]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 

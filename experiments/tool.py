@@ -1,4 +1,8 @@
-"""Runs the `warpath` binary for the experiments, and reads what it leaves."""
+"""Runs the `warpath` binary for the experiments, and reads what it leaves.
+
+Every call leaves a record beside its output. A call whose record is there is not made again, and `compare` keeps the runs that it has
+finished, so an experiment that was interrupted goes on where it was. Delete its folder to begin anew.
+"""
 
 import json
 import os
@@ -54,7 +58,7 @@ def arguments(options, fixed=()):
             words += [word for key, item in value.items() for word in ("-D", f"{key}={item}")]
         else:
             words += [f"--{name.replace('_', '-')}", str(value if name in fixed else SETTINGS.overrides.get(name, value))]
-    everywhere = [key for key in ("seed", "threads", "uniform") if key in SETTINGS.overrides and key not in (*options, *fixed)]
+    everywhere = [key for key in ("seed", "uniform") if key in SETTINGS.overrides and key not in (*options, *fixed)]
     return words + [word for key in everywhere for word in (f"--{key}", SETTINGS.overrides[key])]
 
 
@@ -64,16 +68,29 @@ def crop(options, x, y, width, height):
     return {"crop": f"{round(x * across)},{round(y * down)},{round(width * across)},{round(height * down)}"}
 
 
-def run(label, *words):
-    """CPU seconds and peak memory in bytes of one call of the binary."""
-    command = [str(SETTINGS.warpath), *map(str, words)]
+def run(label, action, *words):
+    """CPU seconds and peak memory in bytes of one call of the binary, or of the same call when it was made before."""
+    words = [str(word) for word in (action, *words)]
+    record = folder_of(label) / f"{action}.json"
+    if record.exists():
+        done = json.loads(record.read_text(encoding="utf-8"))
+        if done["words"] == words:
+            return done["cpu_seconds"], done["peak_memory"]
+    command = [str(SETTINGS.warpath), *words, *(("--resume",) if action == "compare" else ())]
+    command += [word for key in ("threads",) if key in SETTINGS.overrides for word in (f"--{key}", SETTINGS.overrides[key])]
     print("$", " ".join(command), file=sys.stderr, flush=True)
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
+    try:
+        _, status, usage = os.wait4(process.pid, 0)
+    except KeyboardInterrupt:
+        process.wait()  # it keeps what it has
+        sys.exit(f"{label}: interrupted")
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode != 0:
         sys.exit(f"{label}: warpath failed")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+    done = {"words": words, "cpu_seconds": usage.ru_utime + usage.ru_stime, "peak_memory": usage.ru_maxrss * 1024}
+    record.write_text(json.dumps(done) + "\n", encoding="utf-8")
+    return done["cpu_seconds"], done["peak_memory"]
 
 
 def folder_of(label):

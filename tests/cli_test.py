@@ -132,10 +132,30 @@ class CommandLine(unittest.TestCase):
         for run in results["results"]:
             self.assertEqual(run["samples"], 32 * 24 * 4)
             for key in ("mse", "relmse", "relmse_trimmed", "mape", "mse_raw", "relmse_raw", "mse_rest", "relmse_rest",
-                        "candidate_seconds", "train_seconds", "warp_seconds", "trace_seconds", "total_seconds"):
+                        "candidate_seconds", "train_seconds", "warp_seconds", "trace_seconds", "total_seconds",
+                        "candidate_cpu_seconds", "train_cpu_seconds", "warp_cpu_seconds", "trace_cpu_seconds", "total_cpu_seconds"):
                 self.assertIsInstance(run[key], (int, float), key)
+            self.assertGreater(run["total_cpu_seconds"], 0)
+            self.assertGreater(run["error_curve"][-1]["cpu_seconds"], run["error_curve"][0]["cpu_seconds"])
         for name in ("index.html", "none.exr", "kdtree_film+bounce1.exr", "reference.exr"):
             self.assertTrue(os.path.exists(os.path.join(report, name)), name)
+
+    def test_compare_resumes(self):
+        report = self.path("report")
+
+        def compare(runs, *more):
+            result = self.warpath("compare", BOX, "--methods", "none,uniform", "--spp", 4, "--runs", runs, "--report", report, *SMALL, *more)
+            if result.returncode != 0:
+                return result
+            with open(os.path.join(report, "results.json")) as file:
+                return json.load(file)["results"]
+
+        first, both = compare(1), compare(2, "--resume")
+        self.assertEqual([both[0], both[2]], first, "the runs that were there are kept, their times too")
+        self.assertEqual([run["seed"] for run in both], [0, 1, 0, 1])
+        other = compare(2, "--resume", "--max-depth", 2)
+        self.assertEqual(other.returncode, 2)
+        self.assertIn("another command", other.stderr)
 
     def test_interrupt_leaves_the_image_so_far(self):
         out = self.path("out.exr")

@@ -101,14 +101,16 @@ struct TrainSettings {
 /// How training went: one point per evaluation of the held-out likelihood.
 struct TrainLog {
   struct Point {
-    double seconds;         ///< since training began
-    std::uint64_t samples;  ///< examples seen, with repetition
-    double loss;            ///< mean -ln q over the last training batches; with Loss::variance, ln E[g / q]
-    double held_out;        ///< the same over the examples held out
+    double seconds;          ///< since training began
+    std::uint64_t samples;   ///< examples seen, with repetition
+    double loss;             ///< mean -ln q over the last training batches; with Loss::variance, ln E[g / q]
+    double held_out;         ///< the same over the examples held out
+    double cpu_seconds = 0;  ///< of all threads, since training began
   };
   std::vector<Point> points;
   double seconds = 0;
-  std::string stopped;  ///< why it ended: `held-out likelihood no longer rises`, `max_steps`, ...
+  std::string stopped;     ///< why it ended: `held-out likelihood no longer rises`, `max_steps`, ...
+  double cpu_seconds = 0;  ///< of all threads
 };
 
 struct Fit {

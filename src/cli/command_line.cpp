@@ -169,6 +169,8 @@ CLI::App* add_command(CLI::App& app, CompareCommand& command) {
   sub->add_option("--runs", command.runs, "Repetitions with seeds that follow each other")
       ->capture_default_str()
       ->check(CLI::Range(1, 10000));
+  sub->add_flag("--resume", command.resume,
+                "Keep the runs that an interrupted call of the same command left in the report's folder");
   auto* given = sub->add_option("--reference", command.reference,
                                 "Image to measure against (ref.variance.exr beside it is its noise)")
                     ->check(CLI::ExistingFile);

@@ -33,6 +33,7 @@ struct CompareCommand {
   std::filesystem::path reference;  ///< empty: rendered here
   int reference_spp = 0;            ///< of the reference that is rendered here; 0: 8 x spp
   std::filesystem::path directory;  ///< where images, results.json and index.html go
+  bool resume = false;              ///< runs that results.json there has already are kept
   std::string typed;                ///< the whole command line
 };
 

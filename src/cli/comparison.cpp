@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <sstream>
 #include <tuple>
 
 #include "cli/terminal.h"
@@ -58,6 +59,20 @@ Reference as_reference(const ImageEstimate& estimate) {
   return reference;
 }
 
+/// A command line without what changes nothing in a run: how many there are, and who does them.
+std::string without_resources(const std::string& command) {
+  std::istringstream words(command);
+  std::string rest;
+  for (std::string word; words >> word;) {
+    if (word == "--resume" || word == "--quiet" || word == "--verbose") continue;
+    if (word == "--runs" || word == "--threads")
+      words >> word;
+    else
+      rest += word + " ";
+  }
+  return rest;
+}
+
 /// MSE and relMSE that the image's own variance promises.
 std::pair<double, double> predicted_errors(const ImageEstimate& image, const ImageRgb& reference) {
   double mse = 0, relmse = 0;
@@ -98,9 +113,11 @@ void ComparisonRunner::run(int threads) {
   c.reference_has_variance = m_reference.variance.has_value();
 
   for (const Method& method : m_methods) m_command.render.sampler(method.layout);  // throws before any work
+  if (m_command.resume) take_finished_runs();
   for (int run = 0; run < m_command.runs && !g_interrupted; ++run)
     for (const Method& method : m_methods) {
       if (g_interrupted) break;
+      if (has_run(method, run)) continue;
       try {
         c.results.push_back(run_method(method, run));
       } catch (const Interrupted&) {
@@ -147,6 +164,36 @@ void ComparisonRunner::prepare_reference() {
   }
 }
 
+void ComparisonRunner::take_finished_runs() {
+  const auto file = m_command.directory / "results.json";
+  if (!std::filesystem::exists(file)) return;
+  Comparison& c = m_data.comparison;
+  const Comparison before = read_results(file);
+  if (without_resources(before.command) != without_resources(c.command))
+    throw ConfigError(fmt::format("--resume: {} was left by another command: {}", file.string(), before.command));
+  if (before.commit != c.commit) c.warnings.push_back(fmt::format("some runs are of commit {}", before.commit));
+  const RenderOptions& render = m_command.render;
+  const auto is_whole = [&](const MethodRun& run) {
+    if (render.time) return run.total_seconds > 0.9 * *render.time;
+    return run.spp > render.spp.value_or(m_tracer->scene().sample_count) - 0.5;
+  };
+  for (const Method& method : m_methods) {
+    const auto image = m_command.directory / (file_name(method.name) + ".exr");
+    if (!std::filesystem::exists(image)) continue;
+    for (const MethodRun& run : before.results)
+      if (run.method == method.name && run.seed - c.seed < static_cast<std::uint64_t>(m_command.runs) && is_whole(run))
+        c.results.push_back(run);
+    if (has_run(method, 0)) m_data.images.push_back({method.name, read_image(image).image});
+  }
+}
+
+bool ComparisonRunner::has_run(const Method& method, int run) const {
+  const std::uint64_t seed = m_data.comparison.seed + static_cast<std::uint64_t>(run);
+  const auto& results = m_data.comparison.results;
+  return std::any_of(results.begin(), results.end(),
+                     [&](const MethodRun& r) { return r.method == method.name && r.seed == seed; });
+}
+
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const std::uint64_t seed = m_command.common.seed + static_cast<std::uint64_t>(run);
   const auto clock = start_clock();
@@ -159,6 +206,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
                                               m_command.render.objective(), m_command.common.quiet);
   PreparedMethod prepared = trainer->prepare(method);
   const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
+  const double prepare_cpu_seconds = prepared.candidate_cpu_seconds + prepared.log.cpu_seconds;
 
   MethodRun result;
   result.method = method.name;
@@ -169,7 +217,8 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   result.candidate_seconds = prepared.candidate_seconds;
   result.train_seconds = prepared.log.seconds;
   result.training_stopped = prepared.log.stopped;
-  for (const auto& p : prepared.log.points) result.training_curve.push_back({p.seconds, p.samples, p.loss, p.held_out});
+  for (const auto& p : prepared.log.points)
+    result.training_curve.push_back({p.seconds, p.samples, p.loss, p.held_out, p.cpu_seconds});
   if (prepared.candidates) {
     const auto& target = prepared.candidates->target;
     result.candidates = result.train_samples = target.size();
@@ -185,9 +234,9 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
                            m_command.common.quiet);
     render_passes(estimator, budget, prepared.guide, progress.callback(), [&] {
       const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
-      result.error_curve.push_back({estimator.spp(),
-                                    prepare_seconds + prepared.guide.fit_seconds + estimator.cost().total(), errors.mse,
-                                    errors.relmse});
+      result.error_curve.push_back(
+          {estimator.spp(), prepare_seconds + prepared.guide.fit_seconds + estimator.cost().total(), errors.mse,
+           errors.relmse, prepare_cpu_seconds + prepared.guide.fit_cpu_seconds + estimator.cost().cpu_total()});
     });
   }
   if (estimator.cost().samples == 0) throw Interrupted{};
@@ -201,6 +250,11 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   if (!prepared.guide.choice.empty()) result.training_stopped = prepared.guide.choice;
   result.train_samples += prepared.guide.taught;
   result.total_seconds = prepare_seconds + prepared.guide.fit_seconds + cost.total();
+  result.candidate_cpu_seconds = prepared.candidate_cpu_seconds;
+  result.train_cpu_seconds = prepared.log.cpu_seconds + prepared.guide.fit_cpu_seconds;
+  result.warp_cpu_seconds = cost.warp_cpu_seconds;
+  result.trace_cpu_seconds = cost.trace_cpu_seconds;
+  result.total_cpu_seconds = prepare_cpu_seconds + prepared.guide.fit_cpu_seconds + cost.cpu_total();
   result.non_finite = estimator.non_finite();
   const ImageEstimate image = estimator.develop();
   const ImageRgb rest = image_rgb(estimator.develop_rest());

@@ -22,6 +22,9 @@ class ComparisonRunner {
 
  private:
   void prepare_reference();
+  /// Takes over the runs of an interrupted call of the same command, with their images.
+  void take_finished_runs();
+  bool has_run(const Method& method, int run) const;
   MethodRun run_method(const Method& method, int run);
   void keep_densities(const Method& method, const PreparedMethod& prepared);
 

@@ -98,6 +98,7 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     prepared.candidates =
         candidates(method.layout, static_cast<std::uint64_t>(static_cast<double>(settings.examples) * settings.alpha));
     prepared.candidate_seconds = prepared.candidates->seconds;
+    prepared.candidate_cpu_seconds = prepared.candidates->cpu_seconds;
   }
   std::shared_ptr<const Proposal> init;
   if (!m_init.empty()) init = load_warp(m_init).proposal;

@@ -28,7 +28,7 @@ struct PreparedMethod {
   std::shared_ptr<const Proposal> proposal;  ///< null for `none`
   TrainLog log;
   std::shared_ptr<const Candidates> candidates;  ///< null if it was not trained now
-  double candidate_seconds = 0;
+  double candidate_seconds = 0, candidate_cpu_seconds = 0;
   Guide guide;  ///< for the passes of the render
 
   /// Adds the candidates to an image that is to have them (--training-samples use).

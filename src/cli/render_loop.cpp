@@ -7,6 +7,7 @@
 
 #include "core/interrupt.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 
 namespace warpath {
 
@@ -75,10 +76,11 @@ void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, Gui
       spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
       stop);
   if (!learns || g_interrupted) return;
-  const auto start = Clock::now();
+  const Stopwatch clock;
   guide.warp = guide.trainer->fit();
   guide.taught += estimator.cost().samples - before;
-  guide.fit_seconds += seconds_since(start);
+  guide.fit_seconds += clock.wall();
+  guide.fit_cpu_seconds += clock.cpu();
 }
 
 }  // namespace

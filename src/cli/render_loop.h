@@ -25,6 +25,7 @@ struct Guide {
   std::string choice{};                      ///< what was decided, and why
   bool keep = false;                         ///< learns from the last pass, too: the warp is wanted, not the image
   double fit_seconds = 0;                    ///< spent between passes
+  double fit_cpu_seconds = 0;                ///< the same, of all threads
   std::uint64_t taught = 0;                  ///< paths that the warp has learned from
   bool empty() const { return !objective && !warp && !trainer; }
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "core/stopwatch.h"
 #include "estimate/film_positions.h"
 #include "estimate/vertex_source.h"
 #include "estimate/warped_source.h"
@@ -224,7 +225,7 @@ void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& p
   };
 
   double warp_seconds = 0, trace_seconds = 0;
-  const auto start = Clock::now();
+  const Stopwatch clock;
   const auto work = [&](Job& job, std::size_t batch) {
     const auto begin = Clock::now();
     number_samples(job, batch);
@@ -269,16 +270,19 @@ void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& p
   run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });
   for (std::size_t p = 0; p < counts.size(); ++p) m_begun[p] += counts[p];
 
-  const double wall = seconds_since(start), thread_time = std::max(1e-12, warp_seconds + trace_seconds);
-  m_cost.warp_seconds += wall * warp_seconds / thread_time;
-  m_cost.trace_seconds += wall * trace_seconds / thread_time;
+  const double warp_share = warp_seconds / std::max(1e-12, warp_seconds + trace_seconds);
+  const double wall = clock.wall(), cpu = clock.cpu();
+  m_cost.warp_seconds += wall * warp_share;
+  m_cost.trace_seconds += wall * (1 - warp_share);
+  m_cost.warp_cpu_seconds += cpu * warp_share;
+  m_cost.trace_cpu_seconds += cpu * (1 - warp_share);
 }
 
 void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& stop) {
   if (!m_emission) return;
   const int rays = kEmissionRays * spp;
   const FilmSettings& film = m_tracer.scene().film;
-  const auto start = Clock::now();
+  const Stopwatch clock;
   // A jittered grid inside each pixel, of at least `rays` cells.
   const int nx = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(rays)))), ny = (rays + nx - 1) / nx;
   const auto cells = static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny);
@@ -327,7 +331,8 @@ void ImageEstimator::add_emission_pass(int spp, const std::function<bool()>& sto
     m_cost.emission_rays += job.ids.size();
   };
   run_ordered<Job>(batches, work, merge, [&] { return stop && stop(); });
-  m_cost.emission_seconds += seconds_since(start);
+  m_cost.emission_seconds += clock.wall();
+  m_cost.trace_cpu_seconds += clock.cpu();
 }
 
 void ImageEstimator::add_uniform_sample(float film_x, float film_y, const Color& radiance) {

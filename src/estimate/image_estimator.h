@@ -24,7 +24,10 @@ struct RenderCost {
   double warp_seconds = 0;          ///< drawing numbers with their density
   double trace_seconds = 0;         ///< tracing and splatting
   double emission_seconds = 0;
+  double warp_cpu_seconds = 0;   ///< of all threads, as the one below
+  double trace_cpu_seconds = 0;  ///< tracing, splatting, directly seen emission
   double total() const { return warp_seconds + trace_seconds + emission_seconds; }
+  double cpu_total() const { return warp_cpu_seconds + trace_cpu_seconds; }
 };
 
 /// What a pass over a stratified film is told by the passes before it.

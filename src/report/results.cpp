@@ -24,6 +24,7 @@ void for_each_field(Point& point, F&& f) {
   f("seconds", point.seconds);
   f("mse", point.mse);
   f("relmse", point.relmse);
+  f("cpu_seconds", point.cpu_seconds);
 }
 
 template <class Point, class F>
@@ -33,6 +34,7 @@ void for_each_field(Point& point, F&& f) {
   f("samples", point.samples);
   f("loss", point.loss);
   f("held_out", point.held_out);
+  f("cpu_seconds", point.cpu_seconds);
 }
 
 template <class Run, class F>
@@ -51,6 +53,11 @@ void for_each_field(Run& run, F&& f) {
   f("warp_seconds", run.warp_seconds);
   f("trace_seconds", run.trace_seconds);
   f("total_seconds", run.total_seconds);
+  f("candidate_cpu_seconds", run.candidate_cpu_seconds);
+  f("train_cpu_seconds", run.train_cpu_seconds);
+  f("warp_cpu_seconds", run.warp_cpu_seconds);
+  f("trace_cpu_seconds", run.trace_cpu_seconds);
+  f("total_cpu_seconds", run.total_cpu_seconds);
   f("mse", run.mse);
   f("relmse", run.relmse);
   f("relmse_trimmed", run.relmse_trimmed);

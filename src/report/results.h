@@ -16,6 +16,7 @@ struct ErrorPoint {
   double seconds = 0;
   double mse = kUnknown;
   double relmse = kUnknown;
+  double cpu_seconds = kUnknown;  ///< the same of processors, summed over threads
 };
 
 /// One evaluation of the held-out likelihood during training.
@@ -24,6 +25,7 @@ struct TrainingPoint {
   std::uint64_t samples = 0;   ///< examples seen, with repetition
   double loss = kUnknown;      ///< mean -ln q over the last training batches
   double held_out = kUnknown;  ///< mean -ln q over the examples held out
+  double cpu_seconds = kUnknown;
 };
 
 /// One method's run. NaN means "not known" (an error without a reference) and is null in JSON.
@@ -41,6 +43,12 @@ struct MethodRun {
   double warp_seconds = 0;          ///< drawing warped numbers while rendering; wall time, as all of these
   double trace_seconds = 0;         ///< the rest of rendering
   double total_seconds = 0;
+  // The same of processors, summed over threads: what other programs make this one wait for does not count.
+  double candidate_cpu_seconds = kUnknown;
+  double train_cpu_seconds = kUnknown;
+  double warp_cpu_seconds = kUnknown;
+  double trace_cpu_seconds = kUnknown;
+  double total_cpu_seconds = kUnknown;
   double mse = kUnknown;
   double relmse = kUnknown;
   double relmse_trimmed = kUnknown;

@@ -5,7 +5,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 
@@ -13,6 +12,7 @@
 #include "core/interrupt.h"
 #include "core/math.h"
 #include "core/rng.h"
+#include "core/stopwatch.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -74,7 +74,7 @@ void Candidates::primary_sample(std::uint64_t id, float* y) const {
 Candidates gather_candidates(const Integrand& integrand, const Layout& layout, std::uint64_t seed, std::uint64_t count,
                              const CandidateProgress& progress, bool keep_contributions) {
   WARPATH_CHECK_EQ(integrand.dims(), layout.dims());
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch clock;
   Candidates candidates;
   candidates.layout = layout;
   candidates.seed = seed;
@@ -95,7 +95,8 @@ Candidates gather_candidates(const Integrand& integrand, const Layout& layout, s
     }
   });
   if (done < count) throw Interrupted();
-  candidates.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  candidates.seconds = clock.wall();
+  candidates.cpu_seconds = clock.cpu();
   return candidates;
 }
 

@@ -92,7 +92,7 @@ FlowTrainer::Result FlowTrainer::run(Floats start, FlowOptimiser::Pass pass) {
   Floats best_parameters = optimiser.parameters();
   double best = held_out_loss(best_parameters), since = 0, rate = m_settings.rate;
   int bad = 0, drops = 0, losses = 0;
-  log.points.push_back({seconds(), 0, best, best});
+  log.points.push_back({m_clock.wall(), 0, best, best, m_clock.cpu()});
   log.stopped = "max_steps";
   for (int s = 1; s <= m_settings.max_steps; ++s) {
     if (g_interrupted) {
@@ -105,8 +105,8 @@ FlowTrainer::Result FlowTrainer::run(Floats start, FlowOptimiser::Pass pass) {
     ++losses;
     if (s % m_settings.evaluate_every != 0 && s != m_settings.max_steps) continue;
     const double held_out = held_out_loss(optimiser.averaged());
-    log.points.push_back({seconds(), static_cast<std::uint64_t>(s) * static_cast<std::uint64_t>(m_settings.batch),
-                          since / losses, held_out});
+    log.points.push_back({m_clock.wall(), static_cast<std::uint64_t>(s) * static_cast<std::uint64_t>(m_settings.batch),
+                          since / losses, held_out, m_clock.cpu()});
     since = losses = 0;
     if (held_out < best) {
       best = held_out;
@@ -121,7 +121,8 @@ FlowTrainer::Result FlowTrainer::run(Floats start, FlowOptimiser::Pass pass) {
       bad = 0;
     }
   }
-  log.seconds = seconds();
+  log.seconds = m_clock.wall();
+  log.cpu_seconds = m_clock.cpu();
   return {std::move(best_parameters), std::move(log)};
 }
 

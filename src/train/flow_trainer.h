@@ -1,7 +1,7 @@
 #pragma once
-#include <chrono>
 #include <cstdint>
 
+#include "core/stopwatch.h"
 #include "train/flow_optimiser.h"
 #include "train/training_data.h"
 
@@ -31,12 +31,11 @@ class FlowTrainer {
   /// g, up to a factor that is the same for all: weight times the density that the example was drawn from.
   float target(std::size_t i) const { return m_examples.inv_q.empty() ? weight(i) : weight(i) / m_examples.inv_q[i]; }
   double held_out_loss(const nn::AlignedVector<float>& parameters) const;
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - m_start).count(); }
 
   const CouplingFlow& m_flow;
   const Examples& m_examples;
   FlowTraining m_settings;
-  std::chrono::steady_clock::time_point m_start = std::chrono::steady_clock::now();
+  Stopwatch m_clock;
   ExampleBlocks m_batch, m_held_out;
   double m_mean_weight = 0, m_held_out_weight = 0;
   // Examples to train on, in an order of its own for every epoch.

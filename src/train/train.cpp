@@ -1,10 +1,10 @@
 #include "train/train.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "core/rng.h"
+#include "core/stopwatch.h"
 #include "train/fit_grid.h"
 #include "train/fit_kdtree.h"
 #include "train/fit_realnvp.h"
@@ -56,7 +56,7 @@ double cross_entropy(const Proposal& proposal, const Examples& examples) {
 
 /// Fits a kd-tree or a grid to all candidates but a few that are held out.
 Fit fit_to_candidates(const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch clock;
   const std::uint64_t held_out = candidates.size() / kHeldOut;
   std::uint64_t count = candidates.size() - held_out;
   const std::uint64_t row_bytes = 2 * sizeof(float) * (static_cast<std::uint64_t>(candidates.layout.dims()) + 1);
@@ -71,14 +71,15 @@ Fit fit_to_candidates(const Candidates& candidates, const TrainSettings& setting
     if (init) throw ConfigError("a kd-tree cannot start from a trained warp");
     fit.proposal = fit_kdtree(std::move(examples), settings.kdtree);
   }
-  fit.log.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  fit.log.seconds = clock.wall();
+  fit.log.cpu_seconds = clock.cpu();
   fit.log.stopped = count == candidates.size() - held_out
                         ? "all candidates seen"
                         : fmt::format("{} candidates seen, as many as fit in memory", count);
   const Examples seen = weighted_examples(candidates, 0, std::min(count, held_out));
   const Examples unseen = weighted_examples(candidates, candidates.size() - held_out, held_out);
-  fit.log.points.push_back(
-      {fit.log.seconds, count, cross_entropy(*fit.proposal, seen), cross_entropy(*fit.proposal, unseen)});
+  fit.log.points.push_back({fit.log.seconds, count, cross_entropy(*fit.proposal, seen),
+                            cross_entropy(*fit.proposal, unseen), fit.log.cpu_seconds});
   return fit;
 }
 
@@ -111,14 +112,14 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
   init = learned(init);
   Fit fit;
   if (settings.family == "realnvp" || settings.family == "spline") {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch clock;
     const bool spline = settings.family == "spline";
     const std::uint64_t rows =
         spline ? std::max(settings.examples, std::min<std::uint64_t>(candidates.size(), kSplineRows))
                : settings.examples;
     const double most = spline ? kSplineMostTarget * moments.mean_square / moments.mean : HUGE_VAL;
     const Examples examples = resample(candidates, rows, mix64(settings.seed + 1), static_cast<float>(most));
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = clock.wall(), cpu_seconds = clock.cpu();
     const auto with_uniform = [&](auto flow) {
       flow.uniform = settings.uniform;
       return flow;
@@ -126,6 +127,7 @@ Fit train(const Candidates& candidates, const TrainSettings& settings, const Pro
     fit = spline ? fit_spline(examples, with_uniform(settings.spline), settings.seed, init)
                  : fit_realnvp(examples, with_uniform(settings.realnvp), settings.seed, init);
     fit.log.seconds += seconds;
+    fit.log.cpu_seconds += cpu_seconds;
   } else {
     fit = fit_to_candidates(candidates, settings, init);
   }

@@ -22,6 +22,7 @@ struct Candidates {
   std::vector<float> contribution;  ///< f, count x channels, as it came; only where it was asked for
   std::uint64_t non_finite = 0;     ///< how many were not finite
   double seconds = 0;               ///< wall time that it took
+  double cpu_seconds = 0;           ///< of all threads
   std::size_t size() const { return target.size(); }
   /// y of candidate `id`: layout.dims() numbers, the ones that a UniformSource of this seed gives to the sample
   /// kFirstCandidate + id.
