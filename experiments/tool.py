@@ -104,7 +104,17 @@ def compare(label, scene, methods, **options):
     folder = folder_of(label)
     run(label, "compare", scene, "--methods", ",".join(map(str, methods)), "--report", folder, *arguments(options))
     with open(folder / "results.json", encoding="utf-8") as file:
-        return json.load(file)["results"]
+        results = json.load(file)["results"]
+    runs = int(SETTINGS.overrides.get("runs", options.get("runs", 1)))
+    if len(results) < len(methods) * runs or any(run["spp"] < spp_of(options) for run in results):
+        (folder / "compare.json").unlink()
+        sys.exit(f"{label}: interrupted; the same command goes on with it")
+    return results
+
+
+def spp_of(options):
+    """What every run has at least, if it was not cut off."""
+    return float(SETTINGS.overrides.get("spp", options.get("spp", 0))) - 0.5
 
 
 def train(label, scene, warp, **options):

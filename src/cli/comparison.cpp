@@ -221,7 +221,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
     result.training_curve.push_back({p.seconds, p.samples, p.loss, p.held_out, p.cpu_seconds});
   if (prepared.candidates) {
     const auto& target = prepared.candidates->target;
-    result.candidates = result.train_samples = target.size();
+    result.candidates = result.train_samples = prepared.candidate_count;
     result.candidates_nonzero =
         static_cast<double>(std::count_if(target.begin(), target.end(), [](float g) { return g > 0; })) /
         static_cast<double>(target.size());

@@ -1,6 +1,7 @@
 #include "cli/method.h"
 
 #include <array>
+#include <optional>
 
 #include "cli/terminal.h"
 #include "core/rng.h"
@@ -19,6 +20,9 @@ constexpr std::string_view kDefaultDimensions = "film+bounce1";
 
 /// Candidates are drawn from other numbers than the image, whatever its seed.
 constexpr std::uint64_t kCandidateStream = 0x63616e6469640003u;
+
+/// More candidates than this, 256 MB of them, are gathered and resampled in chunks of so many, where the family allows.
+constexpr std::uint64_t kChunk = std::uint64_t{1} << 26;
 
 }  // namespace
 
@@ -54,17 +58,42 @@ Method parse_method(const std::string& text) {
   return method;
 }
 
+std::shared_ptr<const Candidates> MethodTrainer::gather(const Layout& layout, std::uint64_t first, std::uint64_t end,
+                                                        const std::function<void(std::uint64_t)>& progress) const {
+  const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
+  const PathIntegrand integrand(m_tracer, layout, seed);
+  return std::make_shared<Candidates>(
+      gather_candidates(integrand, layout, seed, end - first, progress, m_use_samples, first));
+}
+
 std::shared_ptr<const Candidates> MethodTrainer::candidates(const Layout& layout, std::uint64_t count) {
   auto& known = m_candidates[layout.name()];
   if (known && known->size() == count) return known;
-  const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
   StageProgress progress(fmt::format("candidates for {}", layout.name()), m_quiet);
-  const PathIntegrand integrand(m_tracer, layout, seed);
-  known = std::make_shared<Candidates>(gather_candidates(
-      integrand, layout, seed, count,
-      [&](std::uint64_t done) { progress.update(static_cast<double>(done) / static_cast<double>(count)); },
-      m_use_samples));
+  known = gather(layout, 0, count,
+                 [&](std::uint64_t done) { progress.update(static_cast<double>(done) / static_cast<double>(count)); });
   return known;
+}
+
+Fit MethodTrainer::train_in_chunks(const Layout& layout, const TrainSettings& settings, const Proposal* init,
+                                   PreparedMethod& prepared) {
+  const std::uint64_t count = prepared.candidate_count;
+  std::optional<StageProgress> progress(std::in_place, fmt::format("candidates for {}", layout.name()), m_quiet);
+  return warpath::train_in_chunks(
+      layout, count,
+      [&](const auto& take) {
+        for (std::uint64_t first = 0; first < count; first += kChunk) {
+          const auto chunk = gather(layout, first, std::min(count, first + kChunk), [&](std::uint64_t done) {
+            progress->update(static_cast<double>(first + done) / static_cast<double>(count));
+          });
+          prepared.candidate_seconds += chunk->seconds;
+          prepared.candidate_cpu_seconds += chunk->cpu_seconds;
+          if (first == 0) prepared.candidates = chunk;
+          take(*chunk);
+        }
+        progress.emplace("training", m_quiet);
+      },
+      settings, init);
 }
 
 void PreparedMethod::add_candidates(ImageEstimator& estimator) const {
@@ -94,18 +123,24 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
   }
   TrainSettings settings = m_settings;
   settings.family = method.family;
-  if (method.family != "uniform") {
-    prepared.candidates =
-        candidates(method.layout, static_cast<std::uint64_t>(static_cast<double>(settings.examples) * settings.alpha));
-    prepared.candidate_seconds = prepared.candidates->seconds;
-    prepared.candidate_cpu_seconds = prepared.candidates->cpu_seconds;
-  }
   std::shared_ptr<const Proposal> init;
   if (!m_init.empty()) init = load_warp(m_init).proposal;
-  Candidates none;
-  none.layout = method.layout;
-  StageProgress progress(fmt::format("training {}", method.name), m_quiet || !prepared.candidates);
-  Fit fit = train(prepared.candidates ? *prepared.candidates : none, settings, init.get());
+  Fit fit;
+  if (method.family != "uniform")
+    prepared.candidate_count = static_cast<std::uint64_t>(static_cast<double>(settings.examples) * settings.alpha);
+  if (prepared.candidate_count > kChunk && trains_in_chunks(method.family) && !m_use_samples) {
+    fit = train_in_chunks(method.layout, settings, init.get(), prepared);
+  } else {
+    Candidates none;
+    none.layout = method.layout;
+    if (prepared.candidate_count > 0) {
+      prepared.candidates = candidates(method.layout, prepared.candidate_count);
+      prepared.candidate_seconds = prepared.candidates->seconds;
+      prepared.candidate_cpu_seconds = prepared.candidates->cpu_seconds;
+    }
+    StageProgress progress(fmt::format("training {}", method.name), m_quiet || !prepared.candidates);
+    fit = train(prepared.candidates ? *prepared.candidates : none, settings, init.get());
+  }
   prepared.proposal = std::move(fit.proposal);
   prepared.log = std::move(fit.log);
   return prepared;

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -27,7 +28,8 @@ Method parse_method(const std::string& text);
 struct PreparedMethod {
   std::shared_ptr<const Proposal> proposal;  ///< null for `none`
   TrainLog log;
-  std::shared_ptr<const Candidates> candidates;  ///< null if it was not trained now
+  std::shared_ptr<const Candidates> candidates;  ///< the first chunk of them; null if it was not trained now
+  std::uint64_t candidate_count = 0;             ///< of all chunks
   double candidate_seconds = 0, candidate_cpu_seconds = 0;
   Guide guide;  ///< for the passes of the render
 
@@ -52,6 +54,12 @@ class MethodTrainer {
 
  private:
   std::shared_ptr<const Candidates> candidates(const Layout& layout, std::uint64_t count);
+  std::shared_ptr<const Candidates> gather(const Layout& layout, std::uint64_t first, std::uint64_t end,
+                                           const std::function<void(std::uint64_t)>& progress) const;
+  /// Gathers prepared.candidate_count candidates and trains; prepared is told what they cost, and keeps the first
+  /// chunk.
+  Fit train_in_chunks(const Layout& layout, const TrainSettings& settings, const Proposal* init,
+                      PreparedMethod& prepared);
 
   std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;

@@ -71,7 +71,7 @@ void run(const TrainCommand& command) {
   if (!prepared.log.points.empty())
     file.settings["held_out"] = fmt::format("{:.6f}", prepared.log.points.back().held_out);
   save(command, std::move(file), settings);
-  log::info("{}: {} from {} candidates, {:.1f} s", command.output.string(), method.name, prepared.candidates->size(),
+  log::info("{}: {} from {} candidates, {:.1f} s", command.output.string(), method.name, prepared.candidate_count,
             prepared.candidate_seconds + prepared.log.seconds);
 }
 

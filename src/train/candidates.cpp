@@ -36,13 +36,13 @@ double target_of(std::span<const double> f) {
   return sum / static_cast<double>(f.size());
 }
 
-/// Evaluates candidates first ... first + count - 1; returns how many targets were not finite.
+/// Evaluates count candidates from the one at `first` of those here; returns how many targets were not finite.
 std::uint64_t evaluate_batch(const Integrand& integrand, Candidates& candidates, Workspace& workspace,
                              std::size_t first, std::size_t count) {
   const FlushDenormals flush;
   const auto dims = static_cast<std::size_t>(candidates.layout.dims());
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t id = kFirstCandidate + first + i;
+    const std::uint64_t id = kFirstCandidate + candidates.first + first + i;
     const std::uint64_t key = sample_key(candidates.seed, id);
     workspace.ids[i] = id;
     for (std::size_t d = 0; d < dims; ++d)
@@ -66,18 +66,19 @@ std::uint64_t evaluate_batch(const Integrand& integrand, Candidates& candidates,
 
 }  // namespace
 
-void Candidates::primary_sample(std::uint64_t id, float* y) const {
-  const std::uint64_t key = sample_key(seed, kFirstCandidate + id);
+void Candidates::primary_sample(std::uint64_t i, float* y) const {
+  const std::uint64_t key = sample_key(seed, kFirstCandidate + first + i);
   for (int d = 0; d < layout.dims(); ++d) y[d] = sample_float(key, layout.dimension(d));
 }
 
 Candidates gather_candidates(const Integrand& integrand, const Layout& layout, std::uint64_t seed, std::uint64_t count,
-                             const CandidateProgress& progress, bool keep_contributions) {
+                             const CandidateProgress& progress, bool keep_contributions, std::uint64_t first_id) {
   WARPATH_CHECK_EQ(integrand.dims(), layout.dims());
   const Stopwatch clock;
   Candidates candidates;
   candidates.layout = layout;
   candidates.seed = seed;
+  candidates.first = first_id;
   candidates.target.resize(count);
   if (keep_contributions) candidates.contribution.resize(count * static_cast<std::size_t>(integrand.channels()));
   tbb::enumerable_thread_specific<Workspace> workspaces(static_cast<std::size_t>(integrand.dims()),

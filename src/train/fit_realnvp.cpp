@@ -64,9 +64,10 @@ void initialise_norms(const realnvp::Flow& flow, const ExampleBlocks& batch, Flo
 
 }  // namespace
 
-Fit fit_realnvp(const Examples& examples, const RealNvpSettings& settings, std::uint64_t seed, const Proposal* init) {
+Fit fit_realnvp(const TrainingSet& examples, const RealNvpSettings& settings, std::uint64_t seed,
+                const Proposal* init) {
   using Norm = RealNvpSettings::Norm;
-  const realnvp::Flow flow(static_cast<int>(examples.y.cols()), settings);
+  const realnvp::Flow flow(static_cast<int>(examples.dims()), settings);
   FlowTrainer trainer(flow, examples, settings, seed);
   Floats parameters = init ? start_from(*init, flow) : flow.initial(mix64(seed + 2));
   if (!init && settings.norm == Norm::actnorm) initialise_norms(flow, trainer.first_batch(), parameters);

@@ -25,8 +25,8 @@ nn::AlignedVector<float> start_from(const Proposal& init, const spline::Flow& fl
 
 }  // namespace
 
-Fit fit_spline(const Examples& examples, const SplineSettings& settings, std::uint64_t seed, const Proposal* init) {
-  const spline::Flow flow(static_cast<int>(examples.y.cols()), settings);
+Fit fit_spline(const TrainingSet& examples, const SplineSettings& settings, std::uint64_t seed, const Proposal* init) {
+  const spline::Flow flow(static_cast<int>(examples.dims()), settings);
   FlowTrainer trainer(flow, examples, settings, seed);
   FlowTrainer::Result result = trainer.run(init ? start_from(*init, flow) : flow.initial(mix64(seed + 2)));
   return {std::make_shared<Spline>(flow, std::move(result.parameters)), std::move(result.log)};

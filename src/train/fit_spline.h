@@ -10,7 +10,12 @@ namespace warpath {
 /// over the examples held out (the last rows) no longer falls; hands out the weights that were best there. The same
 /// bits for any number of threads. `init`: weights to start from; throws ConfigError unless it is a spline flow of the
 /// same architecture. Ends with the best so far when g_interrupted is set; throws Interrupted if there is none yet.
-Fit fit_spline(const Examples& examples, const SplineSettings& settings, std::uint64_t seed,
+Fit fit_spline(const TrainingSet& examples, const SplineSettings& settings, std::uint64_t seed,
                const Proposal* init = nullptr);
+
+inline Fit fit_spline(const Examples& examples, const SplineSettings& settings, std::uint64_t seed,
+                      const Proposal* init = nullptr) {
+  return fit_spline(ExampleSet(examples), settings, seed, init);
+}
 
 }  // namespace warpath

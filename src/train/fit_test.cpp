@@ -313,6 +313,33 @@ TEST(Train, CanStartFromAMixture) {
   EXPECT_THROW(train(candidates, quick("kdtree"), first.proposal.get()), ConfigError);
 }
 
+TEST(Train, FlowsLearnFromChunksAsFromOnePiece) {
+  // Not the same numbers, since the first chunk tells how many examples there will be, but as good a density.
+  const TestIntegrand integrand = bump(2);
+  const Layout layout = layout_of(2);
+  constexpr std::uint64_t kCount = 40'000;
+  for (const char* family : {"realnvp", "spline"}) {
+    TrainSettings settings = quick(family);
+    const Candidates whole = gather_candidates(integrand, layout, 1, kCount);
+    const Fit piece = train(whole, settings);
+    std::vector<float> seen;
+    const Fit chunks = train_in_chunks(
+        layout, kCount,
+        [&](const auto& take) {
+          for (std::uint64_t first = 0; first < kCount; first += kCount / 4) {
+            const Candidates chunk = gather_candidates(integrand, layout, 1, kCount / 4, {}, false, first);
+            seen.insert(seen.end(), chunk.target.begin(), chunk.target.end());
+            take(chunk);
+          }
+        },
+        settings);
+    EXPECT_EQ(seen, whole.target) << "chunks are the same candidates";
+    const double learned = second_moment(integrand, *piece.proposal);
+    EXPECT_LT(learned, 0.8 * second_moment(integrand, Uniform(2))) << family;
+    EXPECT_NEAR(second_moment(integrand, *chunks.proposal), learned, 0.1 * learned) << family;
+  }
+}
+
 TEST(Train, SettingsThatMakeNoSenseAreRefused) {
   const Candidates candidates = gather_candidates(bump(2), layout_of(2), 1, 1000);
   TrainSettings settings = quick("kdtee");

@@ -14,37 +14,50 @@ using nn::kBlock;
 using Floats = nn::AlignedVector<float>;
 using Doubles = nn::AlignedVector<double>;
 
-FlowTrainer::FlowTrainer(const CouplingFlow& flow, const Examples& examples, const FlowTraining& settings,
+namespace {
+
+/// Examples held out at most: more would tell the loss no better than is needed to see that it still falls.
+constexpr std::size_t kMostHeldOut = std::size_t{1} << 18;
+
+}  // namespace
+
+FlowTrainer::FlowTrainer(const CouplingFlow& flow, const TrainingSet& examples, const FlowTraining& settings,
                          std::uint64_t seed)
-    : m_flow(flow), m_examples(examples), m_settings(settings), m_order_seed(mix64(seed + 1)) {
-  const std::size_t count = examples.size(), dims = examples.y.cols();
+    : m_flow(flow), m_examples(examples), m_settings(settings), m_y(examples.dims()), m_order_seed(mix64(seed + 1)) {
+  const std::size_t count = examples.size(), dims = examples.dims();
   if (settings.batch < 1) throw ConfigError(fmt::format("batch {}: must be at least 1", settings.batch));
   if (!(settings.held_out > 0 && settings.held_out < 1))
     throw ConfigError(fmt::format("held_out {}: must be between 0 and 1", settings.held_out));
-  const std::size_t held_out = static_cast<std::size_t>(settings.held_out * static_cast<double>(count));
+  const std::size_t held_out =
+      std::min(kMostHeldOut, static_cast<std::size_t>(settings.held_out * static_cast<double>(count)));
   if (held_out < 1 || count < held_out + 1)
     throw ConfigError(fmt::format("{} examples are too few to train a flow on", count));
 
   // The last rows are held out: copies of one candidate are adjacent, and must not stand on both sides.
   const std::size_t trained = count - held_out;
-  std::vector<std::uint32_t> rest;
+  m_order.reserve(trained);
   for (std::size_t i = 0; i < trained; ++i) {
-    if (!(weight(i) > 0)) continue;
-    rest.push_back(static_cast<std::uint32_t>(i));
-    m_mean_weight += static_cast<double>(weight(i));
+    const float weight = examples.weight(i);
+    if (!(weight > 0)) continue;
+    m_order.push_back(static_cast<std::uint32_t>(i));
+    m_mean_weight += static_cast<double>(weight);
   }
   m_held_out.resize(held_out, dims);
   for (std::size_t i = trained; i < count; ++i) {
-    m_held_out.set(i - trained, examples.y.batch().row(i), weight(i), target(i));
-    m_held_out_weight += static_cast<double>(weight(i));
+    copy(i, examples.weight(i), m_held_out, i - trained);
+    m_held_out_weight += static_cast<double>(examples.weight(i));
   }
-  if (rest.empty() || !(m_held_out_weight > 0)) throw ConfigError("no example has any weight: nothing to train on");
-  m_mean_weight /= static_cast<double>(rest.size());
-  m_order = std::move(rest);
+  if (m_order.empty() || !(m_held_out_weight > 0)) throw ConfigError("no example has any weight: nothing to train on");
+  m_mean_weight /= static_cast<double>(m_order.size());
   m_next = m_order.size();
 
   m_batch.resize(static_cast<std::size_t>(settings.batch), dims);
   next_batch();
+}
+
+void FlowTrainer::copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k) {
+  m_examples.primary_sample(i, m_y.data());
+  to.set(k, m_y, weight, m_examples.target(i));
 }
 
 // Fisher and Yates's shuffle.
@@ -62,7 +75,7 @@ void FlowTrainer::next_batch() {
   const double scale = 1 / (m_mean_weight * m_settings.batch);
   for (std::size_t i = 0; i < static_cast<std::size_t>(m_settings.batch); ++i) {
     const std::uint32_t e = next_example();
-    m_batch.set(i, m_examples.y.batch().row(e), static_cast<float>(static_cast<double>(weight(e)) * scale), target(e));
+    copy(e, static_cast<float>(static_cast<double>(m_examples.weight(e)) * scale), m_batch, i);
   }
 }
 

@@ -12,7 +12,7 @@ namespace warpath {
 class FlowTrainer {
  public:
   /// Throws ConfigError for settings or examples that nothing can be learned with.
-  FlowTrainer(const CouplingFlow& flow, const Examples& examples, const FlowTraining& settings, std::uint64_t seed);
+  FlowTrainer(const CouplingFlow& flow, const TrainingSet& examples, const FlowTraining& settings, std::uint64_t seed);
 
   const ExampleBlocks& first_batch() const { return m_batch; }
 
@@ -27,16 +27,16 @@ class FlowTrainer {
  private:
   void next_batch();
   std::uint32_t next_example();
-  float weight(std::size_t i) const { return m_examples.weight.empty() ? 1.0f : m_examples.weight[i]; }
-  /// g, up to a factor that is the same for all: weight times the density that the example was drawn from.
-  float target(std::size_t i) const { return m_examples.inv_q.empty() ? weight(i) : weight(i) / m_examples.inv_q[i]; }
+  /// Copies example i to place k of `to`, with the weight given.
+  void copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k);
   double held_out_loss(const nn::AlignedVector<float>& parameters) const;
 
   const CouplingFlow& m_flow;
-  const Examples& m_examples;
+  const TrainingSet& m_examples;
   FlowTraining m_settings;
   Stopwatch m_clock;
   ExampleBlocks m_batch, m_held_out;
+  std::vector<float> m_y;  // of one example
   double m_mean_weight = 0, m_held_out_weight = 0;
   // Examples to train on, in an order of its own for every epoch.
   std::vector<std::uint32_t> m_order;

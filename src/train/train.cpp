@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/rng.h"
 #include "core/stopwatch.h"
@@ -83,6 +84,33 @@ Fit fit_to_candidates(const Candidates& candidates, const TrainSettings& setting
   return fit;
 }
 
+constexpr auto kDark = "no candidate has any light";
+
+/// Throws ConfigError for settings that make no sense.
+void check(const TrainSettings& settings, const Layout& layout, const Proposal* init) {
+  constexpr std::string_view kFamilies[] = {"uniform", "grid", "kdtree", "realnvp", "spline"};
+  if (std::find(std::begin(kFamilies), std::end(kFamilies), settings.family) == std::end(kFamilies))
+    throw ConfigError(
+        fmt::format("unknown warp family \"{}\";{}", settings.family, suggestion(settings.family, kFamilies)));
+  if (!(settings.uniform >= 0 && settings.uniform < 1))
+    throw ConfigError(fmt::format("the share of uniform samples is {}, not in [0, 1)", settings.uniform));
+  if (init && init->dims() != layout.dims())
+    throw ConfigError(fmt::format("the warp to start from has {} dimensions, not {}", init->dims(), layout.dims()));
+}
+
+Fit untrained(const Layout& layout, std::string why) {
+  return {std::make_shared<const Uniform>(layout.dims()), {.points = {}, .stopped = std::move(why)}};
+}
+
+/// What was learned, mixed with its share of uniform samples.
+Fit with_uniform(Fit fit, const TrainSettings& settings) {
+  if (settings.uniform > 0)
+    fit.proposal = std::make_shared<Mixture>(
+        std::vector<Mixture::Component>{{fit.proposal, 1 - settings.uniform},
+                                        {std::make_shared<const Uniform>(fit.proposal->dims()), settings.uniform}});
+  return fit;
+}
+
 }  // namespace
 
 std::uint64_t candidate_count(const TrainSettings& settings) {
@@ -95,46 +123,47 @@ std::uint64_t candidate_count(const TrainSettings& settings) {
 }
 
 Fit train(const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
-  constexpr std::string_view kFamilies[] = {"uniform", "grid", "kdtree", "realnvp", "spline"};
-  if (std::find(std::begin(kFamilies), std::end(kFamilies), settings.family) == std::end(kFamilies))
-    throw ConfigError(
-        fmt::format("unknown warp family \"{}\";{}", settings.family, suggestion(settings.family, kFamilies)));
-  if (!(settings.uniform >= 0 && settings.uniform < 1))
-    throw ConfigError(fmt::format("the share of uniform samples is {}, not in [0, 1)", settings.uniform));
-  const int dims = candidates.layout.dims();
-  if (init && init->dims() != dims)
-    throw ConfigError(fmt::format("the warp to start from has {} dimensions, not {}", init->dims(), dims));
-  const auto uniform = std::make_shared<const Uniform>(dims);
-  if (settings.family == "uniform") return {uniform, {.points = {}, .seconds = 0, .stopped = "nothing to learn"}};
-  const TargetMoments moments = target_moments(candidates);
-  if (!(moments.mean > 0)) return {uniform, {.points = {}, .seconds = 0, .stopped = "no candidate has any light"}};
+  if (trains_in_chunks(settings.family))
+    return train_in_chunks(
+        candidates.layout, candidates.size(), [&](const auto& take) { take(candidates); }, settings, init);
+  check(settings, candidates.layout, init);
+  if (settings.family == "uniform") return untrained(candidates.layout, "nothing to learn");
+  if (!(target_moments(candidates).mean > 0)) return untrained(candidates.layout, kDark);
+  return with_uniform(fit_to_candidates(candidates, settings, learned(init)), settings);
+}
 
-  init = learned(init);
-  Fit fit;
-  if (settings.family == "realnvp" || settings.family == "spline") {
+bool trains_in_chunks(const std::string& family) { return family == "realnvp" || family == "spline"; }
+
+Fit train_in_chunks(const Layout& layout, std::uint64_t count, const CandidateChunks& chunks,
+                    const TrainSettings& settings, const Proposal* init) {
+  check(settings, layout, init);
+  WARPATH_CHECK(trains_in_chunks(settings.family));
+  const bool spline = settings.family == "spline";
+  const std::uint64_t rows = spline ? std::max(settings.examples, std::min(count, kSplineRows)) : settings.examples;
+  Resampler resampler(layout, count, rows, mix64(settings.seed + 1));
+  double seconds = 0, cpu_seconds = 0;
+  std::optional<float> most;  // told by the first chunk with light
+  chunks([&](const Candidates& chunk) {
     const Stopwatch clock;
-    const bool spline = settings.family == "spline";
-    const std::uint64_t rows =
-        spline ? std::max(settings.examples, std::min<std::uint64_t>(candidates.size(), kSplineRows))
-               : settings.examples;
-    const double most = spline ? kSplineMostTarget * moments.mean_square / moments.mean : HUGE_VAL;
-    const Examples examples = resample(candidates, rows, mix64(settings.seed + 1), static_cast<float>(most));
-    const double seconds = clock.wall(), cpu_seconds = clock.cpu();
-    const auto with_uniform = [&](auto flow) {
-      flow.uniform = settings.uniform;
-      return flow;
-    };
-    fit = spline ? fit_spline(examples, with_uniform(settings.spline), settings.seed, init)
-                 : fit_realnvp(examples, with_uniform(settings.realnvp), settings.seed, init);
-    fit.log.seconds += seconds;
-    fit.log.cpu_seconds += cpu_seconds;
-  } else {
-    fit = fit_to_candidates(candidates, settings, init);
-  }
-  if (settings.uniform > 0)
-    fit.proposal = std::make_shared<Mixture>(
-        std::vector<Mixture::Component>{{fit.proposal, 1 - settings.uniform}, {uniform, settings.uniform}});
-  return fit;
+    if (!most)
+      if (const TargetMoments moments = target_moments(chunk); moments.mean > 0)
+        most = static_cast<float>(spline ? kSplineMostTarget * moments.mean_square / moments.mean : HUGE_VAL);
+    resampler.add(chunk, most.value_or(HUGE_VALF));
+    seconds += clock.wall();
+    cpu_seconds += clock.cpu();
+  });
+  const ResampledExamples examples = std::move(resampler).take();
+  if (examples.size() == 0) return untrained(layout, kDark);
+
+  const auto counting_on = [&](auto flow) {
+    flow.uniform = settings.uniform;
+    return flow;
+  };
+  Fit fit = spline ? fit_spline(examples, counting_on(settings.spline), settings.seed, learned(init))
+                   : fit_realnvp(examples, counting_on(settings.realnvp), settings.seed, learned(init));
+  fit.log.seconds += seconds;
+  fit.log.cpu_seconds += cpu_seconds;
+  return with_uniform(std::move(fit), settings);
 }
 
 }  // namespace warpath
