@@ -188,7 +188,8 @@ void Learner::learn_flow(Examples examples, bool tempered) {
     settings.average = 0.99;
     settings.max_steps =
         std::max(200, static_cast<int>(kEpochs * examples.size() / static_cast<std::size_t>(settings.batch)));
-    const Fit result = fit(examples, settings, sample_key(m_seed, static_cast<std::uint64_t>(++m_flows)), m_warp.get());
+    const Fit result =
+        fit(ExampleSet(examples), settings, sample_key(m_seed, static_cast<std::uint64_t>(++m_flows)), m_warp.get());
     m_warp = std::dynamic_pointer_cast<const Warp>(result.proposal);
     log::debug("flow: {} examples, loss {:.4g}, {}", examples.size(), result.log.points.back().held_out,
                result.log.stopped);

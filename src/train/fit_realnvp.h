@@ -13,9 +13,4 @@ namespace warpath {
 Fit fit_realnvp(const TrainingSet& examples, const RealNvpSettings& settings, std::uint64_t seed,
                 const Proposal* init = nullptr);
 
-inline Fit fit_realnvp(const Examples& examples, const RealNvpSettings& settings, std::uint64_t seed,
-                       const Proposal* init = nullptr) {
-  return fit_realnvp(ExampleSet(examples), settings, seed, init);
-}
-
 }  // namespace warpath

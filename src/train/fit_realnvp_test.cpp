@@ -107,7 +107,7 @@ TEST(FitRealNvp, LearnsARamp) {
   RealNvpSettings s = small();
   s.max_steps = 400;
   s.average = 0.95;
-  const Fit fit = fit_realnvp(ramp(1, 20'000), s, 1);
+  const Fit fit = fit_realnvp(ExampleSet(ramp(1, 20'000)), s, 1);
   EXPECT_LT(fit.log.points.back().held_out, -0.12);
   EXPECT_DOUBLE_EQ(fit.log.points.front().held_out, 0) << "untrained: the identity";
   EXPECT_GT(fit.log.points.back().samples, 0u);
@@ -115,7 +115,7 @@ TEST(FitRealNvp, LearnsARamp) {
 
 TEST(FitRealNvp, KeepsEveryPromiseWhenTrained) {
   for (const int dims : {1, 2, 3, 5}) {
-    const Fit fit = fit_realnvp(ramp(dims, 5'000), small(), 2);
+    const Fit fit = fit_realnvp(ExampleSet(ramp(dims, 5'000)), small(), 2);
     EXPECT_LT(fit.log.points.back().held_out, -0.1) << dims;
     CheckOptions options;  // float32 networks
     options.log_q_tolerance = 2e-3;
@@ -137,7 +137,7 @@ TEST(FitRealNvp, SameBitsForAnyNumberOfThreads) {
       s.norm = norm;
       s.max_steps = 30;
       s.evaluate_every = 10;
-      parameters.push_back(realnvp_of(fit_realnvp(ramp(3, 4'000), s, 4)).parameters());
+      parameters.push_back(realnvp_of(fit_realnvp(ExampleSet(ramp(3, 4'000)), s, 4)).parameters());
     }
     EXPECT_EQ(parameters[0], parameters[1]);
     EXPECT_EQ(parameters[0], parameters[2]);
@@ -149,7 +149,7 @@ TEST(FitRealNvp, BatchNormalisationLearnsAndIsFolded) {
   RealNvpSettings s = small();
   s.norm = RealNvpSettings::Norm::batch;
   s.max_steps = 300;
-  const Fit fit = fit_realnvp(ramp(2, 10'000), s, 1);
+  const Fit fit = fit_realnvp(ExampleSet(ramp(2, 10'000)), s, 1);
   EXPECT_LT(fit.log.points.back().held_out, -0.5);
   CheckOptions options;
   options.log_q_tolerance = 2e-3;
@@ -163,7 +163,7 @@ TEST(FitRealNvp, StopsWhenTheHeldOutLossNoLongerFalls) {
   RealNvpSettings s = small();
   s.evaluate_every = 5;
   s.max_steps = 100'000;
-  const Fit fit = fit_realnvp(noise, s, 1);
+  const Fit fit = fit_realnvp(ExampleSet(noise), s, 1);
   EXPECT_EQ(fit.log.stopped, "held-out loss no longer falls");
   EXPECT_LT(fit.log.points.size(), 2'000u);
 }
@@ -177,18 +177,18 @@ TEST(FitRealNvp, WeightsStandForRepetition) {
   }
   RealNvpSettings s = small();
   s.max_steps = 400;
-  EXPECT_LT(fit_realnvp(weighted, s, 1).log.points.back().held_out, -0.09);
+  EXPECT_LT(fit_realnvp(ExampleSet(weighted), s, 1).log.points.back().held_out, -0.09);
 }
 
 TEST(FitRealNvp, StartsFromSavedWeights) {
   RealNvpSettings s = small();
   const Examples examples = ramp(2, 10'000);
-  const Fit first = fit_realnvp(examples, s, 1);
-  const Fit second = fit_realnvp(examples, s, 1, first.proposal.get());
+  const Fit first = fit_realnvp(ExampleSet(examples), s, 1);
+  const Fit second = fit_realnvp(ExampleSet(examples), s, 1, first.proposal.get());
   EXPECT_LT(second.log.points.front().held_out, first.log.points[1].held_out);
   s.couplings = 5;
-  EXPECT_THROW(fit_realnvp(examples, s, 1, first.proposal.get()), ConfigError);
-  EXPECT_THROW(fit_realnvp(examples, s, 1, std::make_unique<Uniform>(2).get()), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(examples), s, 1, first.proposal.get()), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(examples), s, 1, std::make_unique<Uniform>(2).get()), ConfigError);
 }
 
 // Examples drawn by g, with g known: E[g / q] is 1 where q = g, E[g] where q = 1.
@@ -199,7 +199,7 @@ TEST(FitRealNvp, LowersTheVariance) {
   s.loss = RealNvpSettings::Loss::variance;
   s.uniform = 0.05;
   s.max_steps = 400;
-  const auto& points = fit_realnvp(examples, s, 1).log.points;
+  const auto& points = fit_realnvp(ExampleSet(examples), s, 1).log.points;
   EXPECT_NEAR(points.front().held_out, std::log(4.0 / 3), 0.02);
   EXPECT_LT(points.back().held_out, 0.1);
   EXPECT_GT(points.back().held_out, 0 - 0.03);
@@ -211,7 +211,7 @@ TEST(FitRealNvp, RareBrightExamplesDoNotRule) {
   for (std::size_t i = 0; i < examples.size(); ++i) examples.inv_q.push_back(i % 1000 == 17 ? 1e-3f : 1.0f);
   RealNvpSettings s = small();
   s.loss = RealNvpSettings::Loss::variance;
-  const Fit fit = fit_realnvp(examples, s, 1);
+  const Fit fit = fit_realnvp(ExampleSet(examples), s, 1);
   std::vector<double> log_q(99);
   Matrix<double> y(99, 1);
   for (std::size_t i = 0; i < 99; ++i) y(i, 0) = static_cast<double>(i + 1) / 100;
@@ -221,21 +221,21 @@ TEST(FitRealNvp, RareBrightExamplesDoNotRule) {
 
 TEST(FitRealNvp, EndsWhenInterrupted) {
   g_interrupted = true;
-  EXPECT_THROW(fit_realnvp(ramp(2, 1'000), small(), 1), Interrupted);
+  EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 1'000)), small(), 1), Interrupted);
   g_interrupted = false;
 }
 
 TEST(FitRealNvp, SettingsThatMakeNoSense) {
   RealNvpSettings s = small();
   s.held_out = 0;
-  EXPECT_THROW(fit_realnvp(ramp(2, 100), s, 1), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 100)), s, 1), ConfigError);
   s = small();
   s.batch = 0;
-  EXPECT_THROW(fit_realnvp(ramp(2, 100), s, 1), ConfigError);
-  EXPECT_THROW(fit_realnvp(ramp(2, 3), small(), 1), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 100)), s, 1), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 3)), small(), 1), ConfigError);
   Examples dark = ramp(2, 100);
   std::fill(dark.weight.begin(), dark.weight.end(), 0.0f);
-  EXPECT_THROW(fit_realnvp(dark, small(), 1), ConfigError);
+  EXPECT_THROW(fit_realnvp(ExampleSet(dark), small(), 1), ConfigError);
 }
 
 }  // namespace

@@ -13,9 +13,4 @@ namespace warpath {
 Fit fit_spline(const TrainingSet& examples, const SplineSettings& settings, std::uint64_t seed,
                const Proposal* init = nullptr);
 
-inline Fit fit_spline(const Examples& examples, const SplineSettings& settings, std::uint64_t seed,
-                      const Proposal* init = nullptr) {
-  return fit_spline(ExampleSet(examples), settings, seed, init);
-}
-
 }  // namespace warpath

@@ -75,7 +75,7 @@ TEST(FitSpline, LearnsAKnownDensity) {
   for (const int dims : {1, 2, 4}) {
     SplineSettings s = small();
     s.max_steps = 500;
-    const Fit fit = fit_spline(ramps(dims, 40'000), s, 1);
+    const Fit fit = fit_spline(ExampleSet(ramps(dims, 40'000)), s, 1);
     EXPECT_NEAR(divergence(*Spline::untrained(dims, s, 1)), -dims * kRamp, 0.02 * dims);
     EXPECT_LT(divergence(*fit.proposal), 0.015 * dims) << dims;
     EXPECT_GT(divergence(*fit.proposal), -0.001) << dims;
@@ -87,7 +87,7 @@ TEST(FitSpline, KeepsEveryPromiseWhenTrained) {
   for (const int dims : {1, 2, 3, 4, 5, 8, 16, 32}) {
     SplineSettings s = small();
     s.max_steps = dims > 8 ? 75 : 150;
-    const Fit fit = fit_spline(ramps(dims, 5'000), s, 2);
+    const Fit fit = fit_spline(ExampleSet(ramps(dims, 5'000)), s, 2);
     EXPECT_LT(fit.log.points.back().held_out, 0.5 * kRamp) << dims;
     CheckOptions options;  // float32 networks
     options.log_q_tolerance = 1e-4;
@@ -106,7 +106,7 @@ TEST(FitSpline, SameBitsForAnyNumberOfThreads) {
     SplineSettings s = small();
     s.max_steps = 30;
     s.evaluate_every = 10;
-    parameters.push_back(spline_of(fit_spline(ramps(3, 4'000), s, 4)).parameters());
+    parameters.push_back(spline_of(fit_spline(ExampleSet(ramps(3, 4'000)), s, 4)).parameters());
   }
   EXPECT_EQ(parameters[0], parameters[1]);
   EXPECT_EQ(parameters[0], parameters[2]);
@@ -120,7 +120,7 @@ TEST(FitSpline, LowersTheVariance) {
   s.loss = Loss::variance;
   s.uniform = 0.05;
   s.max_steps = 400;
-  const auto& points = fit_spline(examples, s, 1).log.points;
+  const auto& points = fit_spline(ExampleSet(examples), s, 1).log.points;
   EXPECT_NEAR(points.front().held_out, std::log(4.0 / 3), 0.02);
   EXPECT_LT(points.back().held_out, 0.05);
   EXPECT_GT(points.back().held_out, 0 - 0.03);
@@ -135,33 +135,33 @@ TEST(FitSpline, WeightsStandForRepetition) {
   }
   SplineSettings s = small();
   s.max_steps = 400;
-  EXPECT_LT(divergence(*fit_spline(weighted, s, 1).proposal), 0.02);
+  EXPECT_LT(divergence(*fit_spline(ExampleSet(weighted), s, 1).proposal), 0.02);
 }
 
 TEST(FitSpline, StartsFromSavedWeights) {
   SplineSettings s = small();
   const Examples examples = ramps(2, 10'000);
-  const Fit first = fit_spline(examples, s, 1);
-  const Fit second = fit_spline(examples, s, 1, first.proposal.get());
+  const Fit first = fit_spline(ExampleSet(examples), s, 1);
+  const Fit second = fit_spline(ExampleSet(examples), s, 1, first.proposal.get());
   EXPECT_LT(second.log.points.front().held_out, first.log.points[1].held_out);
   s.bins = 9;
-  EXPECT_THROW(fit_spline(examples, s, 1, first.proposal.get()), ConfigError);
-  EXPECT_THROW(fit_spline(examples, s, 1, std::make_unique<Uniform>(2).get()), ConfigError);
+  EXPECT_THROW(fit_spline(ExampleSet(examples), s, 1, first.proposal.get()), ConfigError);
+  EXPECT_THROW(fit_spline(ExampleSet(examples), s, 1, std::make_unique<Uniform>(2).get()), ConfigError);
 }
 
 TEST(FitSpline, EndsWhenInterrupted) {
   g_interrupted = true;
-  EXPECT_THROW(fit_spline(ramps(2, 1'000), small(), 1), Interrupted);
+  EXPECT_THROW(fit_spline(ExampleSet(ramps(2, 1'000)), small(), 1), Interrupted);
   g_interrupted = false;
 }
 
 TEST(FitSpline, SettingsThatMakeNoSense) {
   SplineSettings s = small();
   s.bins = 1;
-  EXPECT_THROW(fit_spline(ramps(2, 100), s, 1), ConfigError);
+  EXPECT_THROW(fit_spline(ExampleSet(ramps(2, 100)), s, 1), ConfigError);
   s = small();
   s.held_out = 1;
-  EXPECT_THROW(fit_spline(ramps(2, 100), s, 1), ConfigError);
+  EXPECT_THROW(fit_spline(ExampleSet(ramps(2, 100)), s, 1), ConfigError);
 }
 
 }  // namespace

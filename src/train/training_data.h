@@ -42,10 +42,10 @@ class TrainingSet {
   virtual float target(std::size_t i) const = 0;                   ///< g, up to a factor that all share
 };
 
-/// Examples that a density is fitted to: y with a weight each. Resampled examples all weigh 1.
+/// Examples that a density is fitted to: y with a weight each.
 struct Examples {
   Matrix<float> y;            ///< N x D
-  std::vector<float> weight;  ///< N; g / q, up to a factor that all share: the target, or 1 after resampling
+  std::vector<float> weight;  ///< N; g / q, up to a factor that all share: the target
   std::vector<float> inv_q;   ///< N; 1 / q, of the density that y was drawn from; empty if that was 1
   std::size_t size() const { return y.rows(); }
 };
