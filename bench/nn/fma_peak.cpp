@@ -1,6 +1,7 @@
 #include "bench/nn/fma_peak.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 
@@ -37,16 +38,21 @@ HWY_AFTER_NAMESPACE();
 namespace warpath::bench {
 HWY_EXPORT(Chains);
 
+double fma_loop(std::int64_t rounds) {
+  static std::atomic<float> sink;  // so that the loop is not taken out
+  float out;
+  const double flops = HWY_DYNAMIC_DISPATCH(Chains)(rounds, &out);
+  sink = out;
+  return flops;
+}
+
 double fma_peak() {
   using Clock = std::chrono::steady_clock;
   double best = 0;
-  volatile float sink = 0;
   for (int i = 0; i < 10; ++i) {
-    float out;
     const auto start = Clock::now();
-    const double flops = HWY_DYNAMIC_DISPATCH(Chains)(500000, &out);
+    const double flops = fma_loop(500'000);
     best = std::max(best, flops / std::chrono::duration<double>(Clock::now() - start).count());
-    sink = sink + out;
   }
   return best;
 }

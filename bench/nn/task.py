@@ -1,0 +1,28 @@
+"""The networks of the flows, two residual blocks, one thread: share of what a loop of nothing but FMAs reaches in the same run, and
+speed over oneDNN and PyTorch."""
+from pathlib import Path
+
+from harness import Bound, Missing, Row
+
+HERE = Path(__file__).resolve().parent
+WIDTHS = (32, 64, 128)
+BLOCK, STEP = 64, 2048  # samples of one iteration of the two benchmarks
+
+
+def rows(bench):
+    ours = bench.counters("nn")
+    samples = {"forward": BLOCK, "train": STEP}
+    for kind, least in (("forward", 0.90), ("train", 0.80)):
+        for width in WIDTHS:
+            row = ours[f"{kind}/{width}"]
+            yield Row(f"{kind}, {width} wide, of the FMA peak", row["of_peak"], "", Bound(least=least), f"{row['cpu_time'] / samples[kind]:.0f} ns a sample, peak {row['peak_GFLOP/s']:.0f} GFLOP/s")
+    nanoseconds = {kind: {width: ours[f"{kind}/{width}"]["cpu_time"] / samples[kind] for width in WIDTHS} for kind in samples}
+    for name, peer in (("oneDNN", lambda: {"forward": bench.json(bench.binary("nn_onednn"), environment={"OMP_NUM_THREADS": "1"})}), ("PyTorch", lambda: bench.torch(HERE / "pytorch.py"))):
+        try:
+            theirs = peer()
+        except Missing as missing:
+            yield Row(f"speed over {name}", None, note=str(missing))
+            continue
+        for kind in theirs:
+            for width in WIDTHS:
+                yield Row(f"{kind}, {width} wide, speed over {name}", theirs[kind][str(width)] / nanoseconds[kind][width], "×", Bound(least=1.0 if kind == "forward" else 2.4))
