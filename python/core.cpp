@@ -1,45 +1,18 @@
 // The Integrator of the C++ library as Python sees it. What people call is python/warpath/integrator.py.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <csignal>
-
-#include "core/interrupt.h"
-#include "warpath/error.h"
+#include "arrays.h"
+#include "training.h"
 #include "warpath/integrator.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
+using namespace nanobind::literals;
 using namespace warpath;
+using namespace warpath::python;
 
 namespace {
-
-using Rows = nb::ndarray<double, nb::numpy, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using ConstRows = nb::ndarray<const double, nb::numpy, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<double, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using ConstNumbers = nb::ndarray<const double, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-template <class T, class Array>
-Batch<T> batch(const Array& array) {
-  return {array.data(), array.shape(0), array.shape(1)};
-}
-
-/// Ctrl-C ends a training that is under way; Python then raises KeyboardInterrupt.
-class StopOnInterrupt {
- public:
-  StopOnInterrupt() : m_before(std::signal(SIGINT, [](int) { g_interrupted = true; })) {}
-  ~StopOnInterrupt() {
-    std::signal(SIGINT, m_before);
-    if (g_interrupted.exchange(false)) std::raise(SIGINT);
-  }
-
- private:
-  void (*m_before)(int);
-};
 
 Iteration end(Integrator& integrator, bool adapt) {
   const nb::gil_scoped_release release;
@@ -47,26 +20,11 @@ Iteration end(Integrator& integrator, bool adapt) {
   return integrator.end(adapt);
 }
 
-void check(bool condition, const char* what) {
-  if (!condition) throw ConfigError(what);
-}
-
 }  // namespace
 
 NB_MODULE(_core, m) {
   m.doc() = "Compiled parts of warpath.";
-  nb::register_exception_translator([](const std::exception_ptr& p, void*) {
-    try {
-      std::rethrow_exception(p);
-    } catch (const ConfigError& error) {
-      PyErr_SetString(PyExc_ValueError, error.what());
-    } catch (const FileError& error) {
-      PyErr_SetString(PyExc_OSError, error.what());
-    } catch (const Interrupted&) {
-      PyErr_SetNone(PyExc_KeyboardInterrupt);
-    }
-  });
-
+  register_errors();
   nb::class_<Iteration>(m, "Iteration", "What one iteration says of each integral.")
       .def_ro("mean", &Iteration::mean)
       .def_ro("covariance", &Iteration::covariance, "C x C, row by row, of the means")
@@ -116,33 +74,33 @@ NB_MODULE(_core, m) {
       .def("begin", &Integrator::begin, "neval"_a)
       .def(
           "draw",
-          [](const Integrator& self, std::size_t first, Rows x, Numbers weight) {
+          [](const Integrator& self, std::size_t first, Rows<double> x, Numbers<double> weight) {
             const nb::gil_scoped_release release;
-            self.draw(first, batch<double>(x), {weight.data(), weight.shape(0)});
+            self.draw(first, batch(x), span(weight));
           },
           "first"_a, "x"_a, "weight"_a)
       .def(
           "add",
-          [](Integrator& self, ConstRows x, ConstNumbers weight, ConstRows f) {
+          [](Integrator& self, Rows<const double> x, Numbers<const double> weight, Rows<const double> f) {
             check(f.shape(0) == x.shape(0) && weight.shape(0) == x.shape(0), "x, weight and f have different lengths");
-            self.add(batch<const double>(x), {weight.data(), weight.shape(0)}, batch<const double>(f));
+            self.add(batch(x), span(weight), batch(f));
           },
           "x"_a, "weight"_a, "f"_a)
       .def("end", end, "adapt"_a)
       .def(
           "sample",
-          [](Integrator& self, Rows x, Numbers weight) {
+          [](Integrator& self, Rows<double> x, Numbers<double> weight) {
             const nb::gil_scoped_release release;
-            self.sample(batch<double>(x), {weight.data(), weight.shape(0)});
+            self.sample(batch(x), span(weight));
           },
           "x"_a, "weight"_a)
       .def(
           "weights",
-          [](const Integrator& self, ConstRows x, Numbers weight) {
+          [](const Integrator& self, Rows<const double> x, Numbers<double> weight) {
             check(x.shape(1) == static_cast<std::size_t>(self.dims()),
                   "x has another number of columns than dimensions");
             check(weight.shape(0) == x.shape(0), "x and weight have different lengths");
-            self.weights(batch<const double>(x), {weight.data(), weight.shape(0)});
+            self.weights(batch(x), span(weight));
           },
           "x"_a, "weight"_a)
       .def("save", &Integrator::save, "path"_a)
@@ -153,4 +111,6 @@ NB_MODULE(_core, m) {
             return Integrator::load(path, {std::move(warp), seed, std::move(sampler), memory});
           },
           "path"_a, "warp"_a, "seed"_a, "sampler"_a, "memory"_a);
+
+  bind_training(m);
 }

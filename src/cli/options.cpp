@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
 #include "scene/scene.h"
 #include "warpath/error.h"
@@ -49,50 +48,6 @@ SceneOptions CommonOptions::scene_options() const {
   }
   options.max_depth = max_depth;
   return options;
-}
-
-namespace {
-
-template <class T>
-void give(const std::optional<T>& option, T& setting) {
-  if (option) setting = *option;
-}
-
-}  // namespace
-
-TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
-  TrainSettings result = settings;
-  result.seed = seed;
-  result.examples = examples ? examples : static_cast<std::uint64_t>(std::llround(epp * 200 * 160));
-  const bool released = architecture == "released";
-  if (released) {
-    result.realnvp = released_realnvp();
-  } else {
-    give(couplings, result.realnvp.couplings);
-    give(width, result.realnvp.width);
-    give(blocks, result.realnvp.blocks);
-    give(encoding_bins, result.realnvp.bins);
-    give(rate, result.realnvp.rate);
-  }
-  give(couplings, result.spline.couplings);
-  give(width, result.spline.width);
-  give(blocks, result.spline.blocks);
-  give(encoding_bins, result.spline.encoding_bins);
-  give(rate, result.spline.rate);
-  give(bins, result.spline.bins);
-  give(bins, result.grid.bins);
-  for (FlowTraining* flow : {static_cast<FlowTraining*>(&result.realnvp), static_cast<FlowTraining*>(&result.spline)}) {
-    give(batch, flow->batch);
-    give(max_steps, flow->max_steps);
-    if (loss == "likelihood") flow->loss = FlowTraining::Loss::likelihood;
-  }
-  if (networks == "separate") result.realnvp.shared = false;
-  if (masks == "alternating") result.realnvp.masks = RealNvpSettings::Masks::alternating;
-  if (bn == "none") result.realnvp.norm = RealNvpSettings::Norm::none;
-  if (bn == "batch") result.realnvp.norm = RealNvpSettings::Norm::batch;
-  result.kdtree.target = kdtree_target == "rms" ? KdTreeSettings::Target::second_moment : KdTreeSettings::Target::mean;
-  if (kdtree_split == "cyclic") result.kdtree.split = KdTreeSettings::Split::cyclic;
-  return result;
 }
 
 std::optional<Objective> RenderOptions::objective() const {
