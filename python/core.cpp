@@ -34,6 +34,8 @@ NB_MODULE(_core, m) {
               "of the first integral: (sum |w|)^2 / sum w^2, w = f / q")
       .def_ro("unweighting_efficiency", &Iteration::unweighting_efficiency, "of the first integral: mean |w| / max |w|")
       .def_ro("adapted", &Iteration::adapted, "whether the warp learned from it")
+      .def_ro("trained", &Iteration::trained,
+              "examples that flows were trained on after it, each as often as it was used")
       .def_ro("warp", &Iteration::warp, "that drew it")
       .def("sdev", &Iteration::sdev, "integral"_a = 0);
 

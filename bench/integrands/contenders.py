@@ -11,26 +11,31 @@ class Outcome(NamedTuple):
     mean: float
     sdev: float
     calls: int  #: of the measurement
-    adapt_seconds: float
+    adapt_seconds: float  #: CPU seconds of all threads, as the machine may have other work
     measure_seconds: float
+    trained: int = 0  #: examples that networks were trained on, each as often as it was used
+
+    @property
+    def seconds(self):
+        return self.adapt_seconds + self.measure_seconds
 
 
 def timed(action):
-    start = time.perf_counter()
+    start = time.process_time()
     result = action()
-    return result, time.perf_counter() - start
+    return result, time.process_time() - start
 
 
 def warpath(task, seed):
     import warpath
 
     integrator = warpath.Integrator([(0, 1)] * task.dims, seed=seed)
-    _, adapt = timed(lambda: integrator(task.f, nitn=NITN, neval=NEVAL))
+    adaptation, adapt = timed(lambda: integrator(task.f, nitn=NITN, neval=NEVAL))
     result, measure = timed(lambda: integrator(task.f, nitn=NITN, neval=NEVAL, adapt=False))
-    return Outcome(result.mean, result.sdev, result.sum_neval, adapt, measure)
+    return Outcome(result.mean, result.sdev, result.sum_neval, adapt, measure, sum(i.trained for i in adaptation.itn_results))
 
 
-def vegas(task, seed, stratified=True):
+def vegas(task, seed, stratified=True, neval=NEVAL):
     import gvar
     import vegas
 
@@ -38,14 +43,29 @@ def vegas(task, seed, stratified=True):
     f = vegas.batchintegrand(lambda x: task.f(np.asarray(x)))
     integrator = vegas.Integrator([[0, 1]] * task.dims)
     # nstrat switches stratification off only where neval stands in the same call.
-    options = {"nitn": NITN, "neval": NEVAL, **({} if stratified else {"nstrat": [1] * task.dims})}
+    options = {"nitn": NITN, "neval": neval, **({} if stratified else {"nstrat": [1] * task.dims})}
     _, adapt = timed(lambda: integrator(f, **options))
     result, measure = timed(lambda: integrator(f, adapt=False, **options))
     return Outcome(result.mean, result.sdev, result.sum_neval, adapt, measure)
 
 
-def vegas_map(task, seed):
-    return vegas(task, seed, stratified=False)
+def vegas_map(task, seed, neval=NEVAL):
+    return vegas(task, seed, stratified=False, neval=neval)
 
 
-CONTENDERS = {"warpath": warpath, "vegas+": vegas, "vegas, no strata": vegas_map}
+def madnis(task, seed, neval=NEVAL):
+    """MadNIS with its defaults: training by fresh samples, 1,024 a step, as many in all as the others adapt with."""
+    import torch
+    from madnis.integrator import Integrator
+
+    torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    integrator = Integrator(lambda x: torch.from_numpy(task.f(x.detach().numpy())).to(x.dtype), dims=task.dims)
+    steps = NITN * neval // 1024
+    _, adapt = timed(lambda: integrator.train(steps))
+    with torch.no_grad():
+        (mean, sdev), measure = timed(lambda: integrator.integrate(NITN * neval))
+    return Outcome(float(mean), float(sdev), NITN * neval, adapt, measure, steps * 1024)
+
+
+CONTENDERS = {"warpath": warpath, "vegas+": vegas, "vegas, no strata": vegas_map, "MadNIS": madnis}

@@ -18,7 +18,8 @@ struct Interval {
 };
 
 struct IntegratorSettings {
-  /// auto: a grid, and a spline flow behind it where that pays; uniform, grid, kdtree, realnvp, spline: that one alone.
+  /// auto: a grid, and a spline flow in front of it where that pays; grid+spline: both in any case; uniform, grid,
+  /// kdtree, realnvp, spline: that one alone.
   std::string warp = "auto";
   std::uint64_t seed = 0;
   std::string sampler = "sobol";              ///< scrambled Sobol' points, or independent ones
@@ -36,8 +37,9 @@ struct Iteration {
   /// Of the first integral's weights w = f / q: (sum |w|)^2 / sum w^2, how many equal ones would be worth as much, and
   /// mean |w| / max |w|, the share that unweighting would accept.
   double effective_samples = 0, unweighting_efficiency = 0;
-  bool adapted = false;  ///< whether the warp learned from it
-  std::string warp;      ///< that drew it
+  bool adapted = false;       ///< whether the warp learned from it
+  std::uint64_t trained = 0;  ///< examples that flows were trained on after it, each as often as it was used
+  std::string warp;           ///< that drew it
   double sdev(std::size_t c = 0) const;
 };
 

@@ -34,6 +34,22 @@ def test_adapts_and_measures():
     assert result.effective_samples > 0.8 * result.itn_results[-1].neval
 
 
+@pytest.mark.filterwarnings("ignore:iterations differ")  # a few in a hundred do by chance
+@pytest.mark.parametrize("warp, seeds", [("uniform", 10), ("grid", 10), ("kdtree", 10), ("realnvp", 3), ("spline", 3), ("grid+spline", 3)])
+def test_every_family_integrates_without_bias(warp, seeds):
+    """None of at most 10 pulls is above 5.5 (by chance in 2e6), and their squares sum to no more than chance gives in 1e5 (chi-squared)."""
+    pulls = []
+    for seed in range(seeds):
+        integrator = warpath.Integrator([(0, 1)] * 3, warp=warp, seed=seed)
+        integrator(camel, nitn=2, neval=4000)
+        result = integrator(camel, nitn=4, neval=4000, adapt=False)
+        pulls.append((result.mean - camel_exact(3)) / result.sdev)
+    assert integrator.warp == warp
+    assert np.abs(pulls).max() < 5.5 and np.sum(np.square(pulls)) < {10: 42, 3: 26}[seeds]
+    spread = result.sdev * math.sqrt(result.sum_neval) / result.mean
+    assert spread < (2.2 if warp == "uniform" else 1.6)
+
+
 def test_same_seed_same_numbers():
     def run(seed):
         integrator = warpath.Integrator([(0, 1)] * 2, seed=seed)

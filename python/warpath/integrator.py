@@ -28,8 +28,8 @@ class Integrator:
 
     Args:
         bounds: D pairs (low, high), or a D x 2 array.
-        warp: "auto", which refines a grid and puts a spline flow in front of it where that pays; or one of "uniform", "grid",
-            "kdtree", "realnvp", "spline". Flows have 32 dimensions at most, kd-trees too, the others 256.
+        warp: "auto", which refines a grid and puts a spline flow in front of it where that pays; "grid+spline", which has both in
+            any case; or one of "uniform", "grid", "kdtree", "realnvp", "spline". Flows have 32 dimensions at most, kd-trees too, the others 256.
         seed: the same seed gives the same numbers, whatever the number of threads.
         sampler: "sobol", scrambled points whose error falls faster than that of independent ones, or "independent".
         memory: most points of past iterations that are learned from.

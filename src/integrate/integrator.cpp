@@ -155,7 +155,9 @@ Iteration Integrator::end(bool adapt) {
   if (!adapt) return result;
   result.adapted = true;
   const double relative = result.mean[0] == 0 ? 0 : result.sdev() / std::abs(result.mean[0]);
+  const std::uint64_t before = m_state->learner.trained();
   m_state->learner.learn(std::move(now->examples), relative * relative * static_cast<double>(result.neval));
+  result.trained = m_state->learner.trained() - before;
   return result;
 }
 

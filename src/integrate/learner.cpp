@@ -24,7 +24,9 @@
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 6> kFamilies{"auto", "uniform", "grid", "kdtree", "realnvp", "spline"};
+constexpr std::string_view kGridSpline = "grid+spline";
+constexpr std::array<std::string_view, 7> kFamilies{"auto",    "uniform", "grid",     "kdtree",
+                                                    "realnvp", "spline",  kGridSpline};
 
 constexpr int kMostFlowDims = 32;
 constexpr double kEnough = 2000;      // effective samples that a warp can learn from without annealing
@@ -37,7 +39,7 @@ constexpr std::size_t kMostGridNumbers = std::size_t{1} << 24;  // coordinates t
 constexpr double kFlowGain = 1.01;  // in effective samples from one iteration to the next, to train a flow on
 constexpr int kFlowTries = 3;       // times that a flow may be trained without beating the grid
 
-bool is_flow(const std::string& family) { return family == "spline" || family == "realnvp"; }
+bool is_flow(const std::string& family) { return family == "spline" || family == "realnvp" || family == kGridSpline; }
 
 }  // namespace
 
@@ -48,7 +50,8 @@ Learner::Learner(int dims, const std::string& family, std::uint64_t seed, std::s
   const int most = is_flow(family) ? kMostFlowDims : family == "kdtree" ? KdTree::kMaxDims : kMaxDims;
   if (dims < 1 || dims > most)
     throw ConfigError(fmt::format("{} dimensions; the warp \"{}\" has 1 to {}", dims, family, most));
-  if (family == "auto" || family == "grid") m_grid = std::make_shared<const Grid>(dims, GridSettings().bins);
+  if (family == "auto" || family == "grid" || family == kGridSpline)
+    m_grid = std::make_shared<const Grid>(dims, GridSettings().bins);
 }
 
 void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
@@ -65,7 +68,7 @@ void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
     m_grid = std::dynamic_pointer_cast<const Grid>(chain->outer());
     m_warp = chain->inner();
     m_grid_done = true;
-    if (!m_grid || m_family != "auto") refuse();
+    if (!m_grid || (m_family != "auto" && m_family != kGridSpline)) refuse();
   } else if (auto grid = std::dynamic_pointer_cast<const Grid>(warp)) {
     if (!m_grid) refuse();
     m_grid = std::move(grid);
@@ -78,6 +81,7 @@ void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
 
 bool Learner::defended() const {
   if (!m_warp) return false;
+  if (m_family == kGridSpline) return true;
   return !m_grid || m_warp_variance == 0 || m_warp_variance <= m_grid_variance || m_grid_variance == 0;
 }
 
@@ -107,7 +111,7 @@ void Learner::learn(Examples examples, double variance) {
   if (effective == 0) return;  // nothing was seen; what there is draws again
   ++m_learned;
   const double count = static_cast<double>(examples.size()), share = effective / count;
-  if (m_family == "auto") m_grid_done = grid_is_done(share);
+  if (m_family == "auto" || m_family == kGridSpline) m_grid_done = grid_is_done(share);
   const bool trained = m_flows > 0 && defended() && share < kFlowGain * m_passes.back().effective_share;
   remember(std::move(examples), share);
 
@@ -136,7 +140,8 @@ void Learner::remember(Examples examples, double effective_share) {
 // A grid has done what it can when an iteration that it drew is hardly better than the one before.
 bool Learner::grid_is_done(double effective_share) const {
   if (m_dims > kMostFlowDims) return false;
-  if (m_grid_done || m_passes.empty() || effective_share > kGoodGrid) return m_grid_done;
+  if (m_grid_done || m_passes.empty()) return m_grid_done;
+  if (effective_share > kGoodGrid) return m_family == kGridSpline;
   const double gain = effective_share / m_passes.back().effective_share;
   return gain < (effective_share < 0.1 ? 4.0 : 1.3);
 }
@@ -191,6 +196,7 @@ void Learner::learn_flow(Examples examples, bool tempered) {
     const Fit result =
         fit(ExampleSet(examples), settings, sample_key(m_seed, static_cast<std::uint64_t>(++m_flows)), m_warp.get());
     m_warp = std::dynamic_pointer_cast<const Warp>(result.proposal);
+    m_trained += result.log.points.back().samples;
     log::debug("flow: {} examples, loss {:.4g}, {}", examples.size(), result.log.points.back().held_out,
                result.log.stopped);
   };

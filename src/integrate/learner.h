@@ -17,7 +17,7 @@ namespace warpath {
 /// iteration goes on from the last one, and b grows to 1 (annealing [Neal01]).
 ///
 /// `auto` refines a grid until that gains little, then puts a spline flow in front of it, unless the grid is good
-/// enough; what measured best draws.
+/// enough; what measured best draws. `grid+spline` has the flow in any case.
 class Learner {
  public:
   /// Throws ConfigError for a family that is unknown, or that cannot have so many dimensions.
@@ -35,6 +35,8 @@ class Learner {
   /// What draws next; `share`: of the second component, if there is one.
   std::shared_ptr<const Proposal> proposal(double share) const;
   std::string description() const;
+  /// Examples that flows were trained on so far, each as often as it was used.
+  std::uint64_t trained() const { return m_trained; }
 
  private:
   struct Pass {
@@ -55,6 +57,7 @@ class Learner {
   std::string m_family;
   std::uint64_t m_seed;
   std::size_t m_memory;
+  std::uint64_t m_trained = 0;
   int m_learned = 0;  ///< iterations, or 1 for all that a loaded proposal saw
   std::vector<Pass> m_passes;
 

@@ -1,6 +1,7 @@
 #include "warp/grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "warp/load.h"
@@ -8,6 +9,8 @@
 
 namespace warpath {
 namespace {
+
+constexpr std::size_t kGuideCells = 4;  // for each interval
 
 /// The largest double below a positive x: what falls into an interval stays below its upper edge.
 double below(double x) { return std::nextafter(x, 0.0); }
@@ -41,12 +44,25 @@ Grid::Grid(Matrix<double> edges) : m_edges(std::move(edges)) {
   for (std::size_t d = 0; d < m_log_slope.rows(); ++d)
     for (std::size_t k = 0; k < m_log_slope.cols(); ++k)
       m_log_slope(d, k) = std::log((m_edges(d, k + 1) - m_edges(d, k)) * bins());
+  const std::size_t cells = kGuideCells * std::bit_ceil(m_log_slope.cols());
+  m_guide = Matrix<std::uint32_t>(m_edges.rows(), cells + 1);
+  for (std::size_t d = 0; d < m_guide.rows(); ++d) {
+    std::size_t bin = 0;
+    for (std::size_t cell = 0; cell <= cells; ++cell) {
+      const double begin = static_cast<double>(cell) / static_cast<double>(cells);
+      while (bin + 1 < m_log_slope.cols() && m_edges(d, bin + 1) <= begin) ++bin;
+      m_guide(d, cell) = static_cast<std::uint32_t>(bin);
+    }
+  }
 }
 
 std::size_t Grid::bin_of(std::size_t d, double y) const {
-  const auto row = m_edges.batch().row(d);
-  const auto inner = row.subspan(1, row.size() - 2);
-  return static_cast<std::size_t>(std::upper_bound(inner.begin(), inner.end(), y) - inner.begin());
+  const std::size_t cells = m_guide.cols() - 1;
+  const double scaled = y * static_cast<double>(cells);
+  const std::size_t cell = scaled < static_cast<double>(cells) ? static_cast<std::size_t>(scaled) : cells - 1;
+  const std::size_t low = m_guide(d, cell), high = m_guide(d, cell + 1);
+  const double* const upper = &m_edges(d, low + 1);  // of the first interval that it may be
+  return low + static_cast<std::size_t>(std::upper_bound(upper, upper + (high - low), y) - upper);
 }
 
 void Grid::forward(Batch<const double> z, Batch<double> y, std::span<double> log_det) const {

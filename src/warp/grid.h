@@ -1,5 +1,5 @@
 #pragma once
-#include <vector>
+#include <cstdint>
 
 #include "warpath/warp.h"
 
@@ -28,6 +28,9 @@ class Grid : public Warp {
   std::size_t bin_of(std::size_t d, double y) const;
 
   Matrix<double> m_edges;
+  /// D x (cells + 1), cells a power of two: the interval in which each of so many equal cells of [0,1) begins. What
+  /// falls into a cell lies between it and the next, mostly in the same: no search.
+  Matrix<std::uint32_t> m_guide;
   Matrix<double> m_log_slope;  ///< D x bins, ln dy/dz
 };
 
