@@ -1,25 +1,31 @@
 """Experiments of the paper on scenes that are written for this project."""
 
-import math
-
 from curves import error_charts
 from pictures import densities_of, images_of, side_by_side, stacked, write_png
 from plot import line_chart
-from tables import column, comparison_table, gain, mean, of_method, rows_of, write_table
-from tool import compare, crop, folder_of, own_scene, render_reference, train
+from tables import column, comparison_table, gain, mean, of_method, rows_of, standard_error, write_table
+from tool import compare, crop, folder_of, own_scene, render_reference
 
-FILM = {"size": "320x180", "max_depth": 6}
+FILM = {"size": "160x90", "max_depth": 6}
+SIZES = {**FILM, "spp": 128, "runs": 3}
+# Where Real NVP misses a caustic, its samples weigh up to 1 / this many times what a uniform one does.
+SHARE = {"uniform": 0.3}
 WARPS_4D = ["kdtree:film+bounce1", "realnvp:film+bounce1"]
 
 
 def coins(epps=(1, 4, 64)):
-    """Rings and coins: caustics. The error falls as the training set grows, epp x 100 x 100 examples, epp 1, 4 and 64."""
-    scene, options = own_scene("coins"), {**FILM, "spp": 128, "runs": 5}
-    against = render_reference("coins", scene, 2048, "kdtree:film+bounce1", epp=64, **FILM)
+    """Rings and coins: caustics. The error falls as the training set grows, epp x 100 x 100 examples, epp 1, 4 and 64.
+
+    The small sets are resampled from 64 candidates for each example: among eight of them there are too few that hit a caustic.
+    """
+    film = {**FILM, "size": "208x117", **SHARE}
+    scene, options = own_scene("coins"), {**SIZES, **film}
+    against = render_reference("coins", scene, 1024, "kdtree:film+bounce1", examples=640000, **film)
     base = compare("coins/baselines", scene, ["none", "uniform:film+bounce1"], **options, **against)
     table, lines, everything = comparison_table(base), {}, list(base)
     for epp in epps:
-        results = compare(f"coins/epp-{epp}", scene, WARPS_4D, **options, examples=epp * 100 * 100, **against)
+        more = {"alpha": 64} if epp < 64 else {}
+        results = compare(f"coins/epp-{epp}", scene, WARPS_4D, **options, examples=epp * 100 * 100, **against, **more)
         table += rows_of(results, base, f"epp-{epp}")
         for method in WARPS_4D:
             lines.setdefault(method, []).append((epp, *gain(of_method(base, "none"), of_method(results, method), "mse")))
@@ -28,7 +34,7 @@ def coins(epps=(1, 4, 64)):
     write_table(folder, table)
     line_chart(folder / "gain.svg", "training set, epp x 100 x 100", "gain in MSE over plain path tracing", lines, rule=1)
     error_charts(folder, everything)
-    close_up = {"exposure": 1.0, "crop": (0.10, 0.18, 0.42, 0.50), "zoom": 2}
+    close_up = {"exposure": 1.0, "crop": (0.10, 0.18, 0.42, 0.50), "zoom": 4}
     pictures = images_of(folder / "baselines", ["none"], **close_up)
     pictures[1:1] = images_of(folder / f"epp-{epps[-1]}", WARPS_4D, **close_up)[:-1]
     write_png(folder / "close-ups.png", stacked([side_by_side(pictures[:2]), side_by_side(pictures[2:])]))
@@ -36,8 +42,8 @@ def coins(epps=(1, 4, 64)):
 
 def billiards():
     """A break shot with balls in motion, epp-16: 4D beats plain path tracing; in 3D (film and time), where the samples fall."""
-    scene, options = own_scene("billiards"), {**FILM, "spp": 128, "runs": 5, "epp": 16}
-    against = render_reference("billiards", scene, 2048, "kdtree:film+bounce1", epp=64, **FILM)
+    scene, options = own_scene("billiards"), {**SIZES, "epp": 16}
+    against = render_reference("billiards", scene, 512, "field", objective="mse", **FILM)
     blurred = ["kdtree:film+time", "realnvp:film+time"]
     methods = ["none", "uniform:film+bounce1", *WARPS_4D, "uniform:film+time", *blurred]
     results = compare("billiards", scene, methods, **options, **against)
@@ -55,99 +61,58 @@ def pairs(pictures):
     return [pictures[k : k + 2] for k in range(0, len(pictures), 2)]
 
 
-def gallery():
-    """93 lights, most of them hidden from most places: the choice of light warped, against even choice and choice by power.
+LIGHT = "film+bounce1.light"
 
-    Twice: with direct light alone, as in the paper, and with five bounces. `none, by power` is plain path tracing that chooses lights
-    in proportion to their power.
-    """
-    scene = own_scene("gallery")
-    dims = ["film+bounce1.light", "film+bounce1.light+bounce1.light_uv"]
-    methods = ["none", *(f"{family}:{d}" for d in dims for family in ("uniform", "kdtree", "realnvp"))]
-    for name, depth in (("direct", 2), ("all", 6)):
-        label, options = f"gallery/{name}", {**FILM, "max_depth": depth}
-        measure = {"spp": 128, "runs": 5, **render_reference(label, scene, 4096, "kdtree:film+bounce1.light", epp=64, **options)}
-        results = compare(label, scene, methods, **options, **measure, epp=16)
-        by_power = compare(f"{label}/by-power", scene, ["none"], **options, **measure, defines={"lights": "power"})
-        results += [{**run, "method": "none, by power"} for run in by_power]
-        folder = folder_of(label)
-        write_table(folder, comparison_table(results))
-        error_charts(folder, results)
-        shown = images_of(folder, ["none", f"kdtree:{dims[0]}", f"realnvp:{dims[0]}"])
-        write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(shown)]))
+
+def gallery():
+    """93 lights, most of them hidden from most places, direct light: the choice of light warped, against even choice and choice by power."""
+    light_choice("gallery", 2, [LIGHT, LIGHT + "+bounce1.light_uv"])
+
+
+def gallery_all():
+    """The same with five bounces."""
+    light_choice("gallery-all", 6, [LIGHT])
+
+
+def light_choice(label, depth, dims):
+    """`none, by power` is plain path tracing that chooses lights in proportion to their power."""
+    scene, film, methods = own_scene("gallery"), {**FILM, "max_depth": depth}, ["none"]
+    methods += [f"{family}:{d}" for d in dims for family in ("uniform", "kdtree", "realnvp")]
+    options = {**SIZES, **film, **render_reference(label, scene, 512, "field", objective="relmse", **film)}
+    results = compare(label, scene, methods, **options, epp=16)
+    by_power = compare(f"{label}/by-power", scene, ["none"], **options, defines={"lights": "power"})
+    results += [{**run, "method": "none, by power"} for run in by_power]
+    folder = folder_of(label)
+    write_table(folder, comparison_table(results))
+    error_charts(folder, results)
+    shown = images_of(folder, ["none", f"kdtree:{LIGHT}", f"realnvp:{LIGHT}"])
+    write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(shown)]))
 
 
 def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
     """Candidates for each resampled example, 1.5 to 64, on the break shot: what more of them cost and gain; the knee.
 
-    The number of examples and of training steps is the same, so only their quality differs. Training of a single step shows what
-    resampling alone takes.
+    The number of examples and of training steps is the same, so only their quality differs.
     """
-    scene, options = own_scene("billiards"), {"size": "160x90", "max_depth": 6}
-    measure = {"spp": 32, "runs": 8, **render_reference("alpha", scene, 2048, "kdtree:film+bounce1", epp=16, **options)}
-    methods = ["uniform:film+bounce1", "realnvp:film+bounce1"]
-    table = ["| α | candidates | candidates s | resampling s | gain over uniform | ± |", "|---|---|---|---|---|---|"]
+    scene, film = own_scene("billiards"), {**FILM, "size": "128x72"}
+    measure = {**film, "spp": 32, "runs": 4, **render_reference("alpha", scene, 512, "field", objective="mse", **film)}
+    base = compare("alpha/baselines", scene, ["none", "uniform:film+bounce1"], **measure)
+    table = ["| α | candidates | candidates, CPU s | resampling, CPU s | gain over uniform | held-out loss |", "|---|---|---|---|---|---|"]
     line, times = [], []
     for a in alphas:
-        results = compare(f"alpha/{a:g}", scene, methods, **options, **measure, alpha=a, epp=2, max_steps=500)
-        single = compare(f"alpha/{a:g}/resampling", scene, methods[1:], **options, **{**measure, "spp": 1}, alpha=a, epp=2, max_steps=1)
-        runs = of_method(results, methods[1])
-        gained, error = gain(of_method(results, methods[0]), runs, "mse")
-        gathering, resampling = mean(column(runs, "candidate_seconds")), mean(column(single, "train_seconds"))
+        runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, epp=1, max_steps=300)
+        gained, error = gain(of_method(base, "uniform:film+bounce1"), runs, "mse")
+        gathering = mean(column(runs, "candidate_cpu_seconds"))
+        resampling = mean([run["train_cpu_seconds"] - run["training_curve"][-1]["cpu_seconds"] for run in runs])
+        losses = [run["training_curve"][-1]["held_out"] for run in runs]
         line.append((a, gained, error))
         times.append((a, gathering + resampling))
-        table.append(f"| {a:g} | {runs[0]['candidates']} | {gathering:.2f} | {resampling:.2f} | {gained:.2f} | {error:.2f} |")
+        table.append(f"| {a:g} | {runs[0]['candidates']} | {gathering:.2f} | {resampling:.3f} | {gained:.2f} ± {error:.2f} |"
+                     f" {mean(losses):.3f} ± {standard_error(losses):.3f} |")  # fmt: skip
     folder = folder_of("alpha")
     write_table(folder, table)
     line_chart(folder / "gain.svg", "α, candidates for each example", "gain in MSE over uniform", {"realnvp, 4D": line})
-    line_chart(folder / "time.svg", "α, candidates for each example", "seconds", {"candidates and resampling": times}, log_y=True)
+    line_chart(folder / "time.svg", "α, candidates for each example", "CPU seconds", {"candidates and resampling": times}, log_y=True)
 
 
-def reuse(steps=(25, 50, 100, 200, 400, 800)):
-    """Weights trained in one view reused for a camera turned by 10, 45 and 90 degrees: loss and gain over training, and how much sooner."""
-    scene, options = own_scene("study"), {"size": "160x90", "max_depth": 8}
-    warp = "realnvp:film+bounce1"
-    trained, _, _ = train("reuse", scene, warp, **options, epp=8)
-    table = ["| turned by | gain from scratch, all steps | steps to reach it from scratch | from reused weights | sooner |", "|---|---|---|---|---|"]
-    folder = folder_of("reuse")
-    for angle in (10, 45, 90):
-        turned = {**options, "defines": {"turn": angle}}
-        measure = {"spp": 32, "runs": 3, **render_reference(f"reuse/{angle}", scene, 4096, objective="mse", **turned)}
-        base = compare(f"reuse/{angle}/uniform", scene, ["uniform:film+bounce1"], **turned, **measure)
-        gains, losses = {}, {}
-        for start, init in (("from scratch", {}), ("reused weights", {"init": trained})):
-            for n in steps:
-                results = compare(f"reuse/{angle}/{start.replace(' ', '-')}-{n}", scene, [warp], **turned, **measure, epp=8, max_steps=n, **init)
-                gains.setdefault(start, []).append((n, *gain(base, results, "mse")))
-            losses[start] = [(p["seconds"], p["held_out"]) for p in results[0]["training_curve"]]
-        line_chart(folder / f"gain-{angle}.svg", "training steps", "gain in MSE over uniform", gains, rule=1)
-        line_chart(folder / f"loss-{angle}.svg", "seconds of training", "held-out loss", losses)
-        table.append(f"| {angle}° | " + " | ".join(sooner(*gains.values())) + " |")
-    write_table(folder, table)
-
-
-def sooner(scratch, reused):
-    """Cells: the last gain from scratch, where each line first comes within 3 % of it, and the ratio of both."""
-    goal = 0.97 * scratch[-1][1]
-    first, second = steps_to(scratch, goal), steps_to(reused, goal)
-    cells = [f"{scratch[-1][1]:.2f} ± {scratch[-1][2]:.2f}", f"{first:.0f}"]
-    if math.isinf(second):
-        return [*cells, "not reached", ""]
-    at_once = second <= reused[0][0]
-    return [*cells, f"{'at most ' if at_once else ''}{second:.0f}", f"{'at least ' if at_once else ''}{first / second:.1f} ×"]
-
-
-def steps_to(line, goal):
-    """Steps after which a gain is reached for the first time, between two points by the logarithm; infinite if it never is."""
-    before = None
-    for steps, gained, _ in line:
-        if gained >= goal:
-            if before is None:
-                return steps
-            share = (goal - before[1]) / (gained - before[1])
-            return before[0] * (steps / before[0]) ** share
-        before = (steps, gained)
-    return math.inf
-
-
-ALL = (coins, billiards, gallery, alpha, reuse)
+ALL = (coins, billiards, gallery, gallery_all, alpha)

@@ -37,6 +37,23 @@ def shared_scene(name):
     return scene
 
 
+def turned_scene(name):
+    """A copy of a shared scene whose camera turns by `-D turn=DEGREES` to its left; everything but the scene file is linked to."""
+    original = shared_scene(name)
+    folder = folder_of(f"scenes/{name}")
+    for entry in original.parent.iterdir():
+        link = folder / entry.name
+        if entry != original and not link.exists():
+            link.symlink_to(entry.resolve())
+    text = original.read_text(encoding="utf-8")
+    camera = text.index("<matrix", text.index("<sensor"))
+    text = text[:camera] + '<rotate y="1" angle="$turn" />' + text[camera:]
+    first = text.index("<default")
+    text = text[:first] + '<default name="turn" value="0" />' + text[first:]
+    (folder / "scene.xml").write_text(text, encoding="utf-8")
+    return folder / "scene.xml"
+
+
 def own_scene(name):
     return ROOT / "scenes" / name / "scene.xml"
 
@@ -91,6 +108,11 @@ def run(label, action, *words):
     done = {"words": words, "cpu_seconds": usage.ru_utime + usage.ru_stime, "peak_memory": usage.ru_maxrss * 1024}
     record.write_text(json.dumps(done) + "\n", encoding="utf-8")
     return done["cpu_seconds"], done["peak_memory"]
+
+
+def peak_memory(label, action):
+    """In bytes, of a call that was made before."""
+    return json.loads((folder_of(label) / f"{action}.json").read_text(encoding="utf-8"))["peak_memory"]
 
 
 def folder_of(label):
