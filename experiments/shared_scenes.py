@@ -92,11 +92,11 @@ def training_time():
     line_chart(folder / "gain.svg", "CPU seconds of training, candidates included", "gain in MSE over plain path tracing", lines, rule=1)
 
 
-def twelve_dims(epps=(1, 4, 16, 64)):
+def twelve_dims(epps=(1, 4, 16)):
     """12D on the kitchen (film and five bounces) with growing training sets: gain, time, and the memory that epp-4096 takes.
 
     epp-4096 has 131 M examples from 1.05 G candidates, an hour and a half of CPU time for these alone. So its cost is told from what a
-    candidate costs, and its memory is measured where paths are cheap: as many examples, chunk by chunk from 1.5 candidates each.
+    candidate costs, and its memory is measured where paths are cheap: as many examples, chunk by chunk from as many candidates.
     """
     scene, options = shared_scene("country-kitchen"), {"size": "320x180", "max_depth": 8, "spp": 32, "runs": 1, **reference("country-kitchen")}
     base = compare("twelve-dims/baselines", scene, ["none", f"uniform:{TWELVE}"], **options)
@@ -113,7 +113,7 @@ def twelve_dims(epps=(1, 4, 16, 64)):
         table.append(f"| epp-{epp} | {run['candidates'] / 1e6:.2f} M | {run['candidate_cpu_seconds']:.0f} | {run['train_cpu_seconds']:.0f} |"
                      f" {peak_memory(label, 'compare') / 1e6:.0f} | {loss:.3f} | {over_none:.2f} | {over_uniform:.2f} |")  # fmt: skip
     _, _, memory = train("twelve-dims/memory", own_scene("box"), f"realnvp:{TWELVE}", size="64x48", max_depth=2,
-                         examples=4096 * 200 * 160, alpha=1.5, max_steps=200)  # fmt: skip
+                         examples=4096 * 200 * 160, alpha=1, max_steps=100)  # fmt: skip
     count = 8 * 4096 * 200 * 160
     table.append(f"| epp-4096, not trained | {count / 1e6:.0f} M | {count * cost:.0f} | | {memory / 1e6:.0f} | | | |")
     folder = folder_of("twelve-dims")

@@ -144,13 +144,23 @@ class CommandLine(unittest.TestCase):
         report = self.path("report")
 
         def compare(runs, *more):
-            result = self.warpath("compare", BOX, "--methods", "none,uniform", "--spp", 4, "--runs", runs, "--report", report, *SMALL, *more)
+            result = self.warpath("compare", BOX, "--methods", "none,kdtree", "--spp", 4, "--examples", 4096, "--runs", runs,
+                                  "--report", report, *SMALL, *more)
             if result.returncode != 0:
                 return result
             with open(os.path.join(report, "results.json")) as file:
                 return json.load(file)["results"]
 
-        first, both = compare(1), compare(2, "--resume")
+        def densities():
+            with open(os.path.join(report, "index.html")) as file:
+                page = file.read()
+            data = page[page.index('id="data">') + len('id="data">'):]
+            return json.loads(data[:data.index("</script>")])["densities"]
+
+        first, pictures = compare(1), densities()
+        both = compare(2, "--resume")
+        self.assertEqual([picture["method"] for picture in pictures], ["kdtree", "kdtree"])
+        self.assertEqual(densities(), pictures)
         self.assertEqual([both[0], both[2]], first, "the runs that were there are kept, their times too")
         self.assertEqual([run["seed"] for run in both], [0, 1, 0, 1])
         other = compare(2, "--resume", "--max-depth", 2)

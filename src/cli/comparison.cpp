@@ -11,6 +11,7 @@
 #include "core/interrupt.h"
 #include "core/log.h"
 #include "core/rng.h"
+#include "report/densities.h"
 #include "train/marginals.h"
 #include "warpath/error.h"
 
@@ -185,6 +186,9 @@ void ComparisonRunner::take_finished_runs() {
         c.results.push_back(run);
     if (has_run(method, 0)) m_data.images.push_back({method.name, read_image(image).image});
   }
+  for (DensityPicture& picture : read_densities(m_command.directory / "densities.json"))
+    for (const Method& method : m_methods)
+      if (picture.method == method.name && has_run(method, 0)) m_data.densities.push_back(std::move(picture));
 }
 
 bool ComparisonRunner::has_run(const Method& method, int run) const {
@@ -293,6 +297,7 @@ void ComparisonRunner::keep_densities(const Method& method, const PreparedMethod
                                 grid(proposal_marginal(*prepared.proposal, x, y, kBins, kSamples)),
                                 grid(target_marginal(*prepared.candidates, x, y, kBins))});
   }
+  write_densities(m_command.directory / "densities.json", m_data.densities);
 }
 
 }  // namespace warpath
