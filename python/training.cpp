@@ -197,6 +197,8 @@ void bind_training(nb::module_& m) {
       .def_prop_rw(
           "leaves", [](const TrainingOptions& o) { return o.settings.kdtree.max_leaves; },
           [](TrainingOptions& o, int leaves) { o.settings.kdtree.max_leaves = leaves; })
+      .def_rw("init", &TrainingOptions::init)
+      .def_rw("training_samples", &TrainingOptions::training_samples)
       .def_rw("bn", &TrainingOptions::bn)
       .def_rw("masks", &TrainingOptions::masks)
       .def_rw("architecture", &TrainingOptions::architecture)

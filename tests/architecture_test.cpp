@@ -23,8 +23,10 @@ const std::map<std::string, std::set<std::string>> kAllowed{
     {"train", {"warp", "nn", "integrand", "core"}},
     {"integrate", {"train", "warp", "integrand", "core"}},
     {"estimate", {"warp", "integrand", "tracer", "scene", "core"}},
+    {"render", {"estimate", "train", "warp", "integrand", "tracer", "scene", "core"}},
     {"report", {"core"}},
-    {"cli", {"core", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "report"}},
+    {"cli",
+     {"core", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "render", "report"}},
 };
 
 bool is_code(const fs::path& path) { return path.extension() == ".h" || path.extension() == ".cpp"; }

@@ -5,6 +5,7 @@
 
 Where what it needs cannot be installed it says why and exits with 77: skipped.
 """
+import os
 import subprocess
 import sys
 import venv
@@ -31,5 +32,12 @@ for peer, tests in {"vegas==6.4.1": "the test of its decorators is", "mitsuba==3
 package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python'}", str(source))
 if package.returncode != 0:
     sys.exit(package.stdout + package.stderr)
+# The renderer is linked from what the build folder holds: compiling it once more would take minutes.
+for command in (["cmake", "-S", source, "-B", build, "-DWARPATH_PYTHON=ON", f"-DPython_EXECUTABLE={python}"],
+                ["cmake", "--build", build, "--target", "_renderer"],
+                ["cmake", "--install", build, "--component", "python", "--prefix", next((environment / "lib").glob("python*/site-packages"))]):
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stdout + done.stderr)
 sys.exit(subprocess.run([python, "-m", "pytest", "-rs", source / "python" / "tests", "--pyargs", "warpath", "--doctest-modules", "--doctest-ignore-import-errors", "-p", "no:cacheprovider"],
-                        cwd=build).returncode)
+                        cwd=build, env=os.environ | {"WARPATH_BINARY": str(build / "warpath"), "WARPATH_SOURCE": str(source)}).returncode)

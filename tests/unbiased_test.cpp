@@ -8,7 +8,7 @@
 #include <cstring>
 #include <functional>
 
-#include "cli/method.h"
+#include "render/method.h"
 #include "estimate/image_estimator.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(Families, Unbiased,
 ImageEstimate render_with_candidates(std::uint64_t seed) {
   TrainSettings settings = short_training();
   settings.seed = seed;
-  MethodTrainer trainer(shared_tracer(), settings, {}, true, std::nullopt, true);
+  MethodTrainer trainer(shared_tracer(), settings, {}, true, std::nullopt);
   const Method method = parse_method("kdtree:film+bounce1");
   const PreparedMethod prepared = trainer.prepare(method);
   ImageEstimator estimator(tracer(), method.layout, prepared.proposal, seed);

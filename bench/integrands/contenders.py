@@ -68,4 +68,4 @@ def madnis(task, seed, neval=NEVAL):
     return Outcome(float(mean), float(sdev), NITN * neval, adapt, measure, steps * 1024)
 
 
-CONTENDERS = {"warpath": warpath, "vegas+": vegas, "vegas, no strata": vegas_map, "MadNIS": madnis}
+CONTENDERS = {"warpath": warpath, "vegas+": vegas, "vegas without strata": vegas_map, "MadNIS": madnis}

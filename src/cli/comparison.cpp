@@ -207,7 +207,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   if (!trainer)
     trainer = std::make_unique<MethodTrainer>(m_tracer, m_command.training.train_settings(seed),
                                               m_command.training.init, m_command.training.use_samples(),
-                                              m_command.render.objective(), m_command.common.quiet);
+                                              m_command.render.objective(), terminal_stages(m_command.common.quiet));
   PreparedMethod prepared = trainer->prepare(method);
   const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
   const double prepare_cpu_seconds = prepared.candidate_cpu_seconds + prepared.log.cpu_seconds;

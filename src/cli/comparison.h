@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "cli/commands.h"
-#include "cli/method.h"
 #include "cli/output.h"
+#include "render/method.h"
 #include "report/html.h"
 
 namespace warpath {

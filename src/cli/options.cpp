@@ -50,21 +50,6 @@ SceneOptions CommonOptions::scene_options() const {
   return options;
 }
 
-std::optional<Objective> RenderOptions::objective() const {
-  if (objective_name == "even") return std::nullopt;
-  return objective_name == "mse" ? Objective::mse : Objective::relmse;
-}
-
-Sampler RenderOptions::sampler(const Layout& layout) const {
-  Sampler chosen = Sampler::independent;
-  for (const Sampler sampler : {Sampler::stratified, Sampler::sobol})
-    if (sampler_name == warpath::sampler_name(sampler)) chosen = sampler;
-  if (chosen != Sampler::independent && layout.contains({GroupKind::film}))
-    throw ConfigError(
-        fmt::format("--sampler {}: {} warps the film, and its samples are independent", *sampler_name, layout.name()));
-  return chosen;
-}
-
 Scene load_scene(const CommonOptions& common, const RenderOptions* render) {
   Scene scene = load_scene(common.scene, common.scene_options());
   if (render && !render->crop.empty()) {

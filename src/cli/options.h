@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/latents.h"
-#include "estimate/allocation.h"
+#include "render/method.h"
 #include "train/training_options.h"
 #include "warpath/layout.h"
 
@@ -37,9 +36,8 @@ struct RenderOptions {
   std::string objective_name = "relmse";    ///< mse, relmse or even
   std::optional<std::string> sampler_name;  ///< independent, stratified or sobol
 
-  std::optional<Objective> objective() const;  ///< none for `even`
-  /// The sampler of a method with this layout. Throws ConfigError if what was asked for does not go with it.
-  Sampler sampler(const Layout& layout) const;
+  std::optional<Objective> objective() const { return parse_objective(objective_name); }
+  Sampler sampler(const Layout& layout) const { return parse_sampler(sampler_name.value_or("independent"), layout); }
 };
 
 /// Loads the scene as the options ask for it; crop is applied to its film.

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/method.h"
 #include "cli/options.h"
-#include "cli/render_loop.h"
 #include "estimate/image_estimator.h"
+#include "render/method.h"
+#include "render/render_loop.h"
 #include "report/image.h"
 
 namespace warpath {

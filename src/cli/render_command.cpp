@@ -1,11 +1,11 @@
 #include <memory>
 
 #include "cli/commands.h"
-#include "cli/method.h"
 #include "cli/output.h"
-#include "cli/render_loop.h"
 #include "cli/terminal.h"
 #include "core/log.h"
+#include "render/method.h"
+#include "render/render_loop.h"
 #include "scene/scene.h"
 #include "warpath/error.h"
 
@@ -23,7 +23,7 @@ void run(const RenderCommand& command) {
 
   const TrainingOptions& training = command.training;
   MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
-                        command.render.objective(), common.quiet);
+                        command.render.objective(), terminal_stages(common.quiet));
   PreparedMethod prepared = trainer.prepare(method);
   ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed, sampler);
   {

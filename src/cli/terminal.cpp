@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <memory>
 
 #include "core/interrupt.h"
 #include "core/log.h"
@@ -46,6 +47,12 @@ void StageProgress::update(double fraction) {
   fmt::print(stderr, "\r\033[K{:<28} [{}{}] {:3.0f} %  {}", m_stage, std::string(static_cast<std::size_t>(filled), '#'),
              std::string(static_cast<std::size_t>(kWidth - filled), '.'), 100 * fraction, left);
   std::fflush(stderr);
+}
+
+std::function<Progress(const std::string& stage)> terminal_stages(bool quiet) {
+  return [quiet](const std::string& stage) -> Progress {
+    return [progress = std::make_shared<StageProgress>(stage, quiet)](double fraction) { progress->update(fraction); };
+  };
 }
 
 void handle_interrupts() {

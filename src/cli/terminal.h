@@ -1,5 +1,6 @@
 #pragma once
 #include <chrono>
+#include <functional>
 #include <string>
 
 #include "core/ordered.h"
@@ -23,6 +24,9 @@ class StageProgress {
   bool m_quiet, m_terminal;
   std::chrono::steady_clock::time_point m_start, m_last_drawn;
 };
+
+/// A StageProgress for every stage that begins, for as long as what this returns is kept.
+std::function<Progress(const std::string& stage)> terminal_stages(bool quiet);
 
 /// Ctrl-C asks running loops to end with what they have; a second one ends the process.
 void handle_interrupts();

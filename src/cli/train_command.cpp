@@ -2,11 +2,11 @@
 #include <memory>
 
 #include "cli/commands.h"
-#include "cli/method.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
 #include "core/interrupt.h"
 #include "core/log.h"
+#include "render/method.h"
 #include "scene/scene.h"
 #include "warpath/error.h"
 #include "warpath/warp_file.h"
@@ -54,7 +54,7 @@ void run(const TrainCommand& command) {
         command.warp));
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
   const TrainSettings settings = command.training.train_settings(common.seed);
-  MethodTrainer trainer(tracer, settings, command.training.init, false, std::nullopt, common.quiet);
+  MethodTrainer trainer(tracer, settings, command.training.init, false, std::nullopt, terminal_stages(common.quiet));
   PreparedMethod prepared = trainer.prepare(method);
   if (prepared.guide.trainer) return train_field(command, *tracer, settings, std::move(prepared.guide));
 

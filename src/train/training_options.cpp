@@ -23,6 +23,8 @@ bool is_second(std::string_view option, const std::string& value, std::string_vi
 
 }  // namespace
 
+bool TrainingOptions::use_samples() const { return is_second("training_samples", training_samples, "discard", "use"); }
+
 TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   TrainSettings result = settings;
   result.seed = seed;

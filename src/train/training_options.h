@@ -25,7 +25,8 @@ struct TrainingOptions {
 
   /// Throws ConfigError for a choice that has no such name.
   TrainSettings train_settings(std::uint64_t seed) const;
-  bool use_samples() const { return training_samples == "use"; }
+  /// Throws ConfigError for what is neither discard nor use.
+  bool use_samples() const;
 };
 
 }  // namespace warpath

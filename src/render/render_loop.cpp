@@ -1,4 +1,4 @@
-#include "cli/render_loop.h"
+#include "render/render_loop.h"
 
 #include <fmt/format.h>
 

@@ -1,9 +1,8 @@
-#include "cli/method.h"
+#include "render/method.h"
 
 #include <array>
 #include <optional>
 
-#include "cli/terminal.h"
 #include "core/rng.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
@@ -58,6 +57,26 @@ Method parse_method(const std::string& text) {
   return method;
 }
 
+std::optional<Objective> parse_objective(const std::string& name) {
+  constexpr std::array<std::string_view, 3> kNames{"mse", "relmse", "even"};
+  if (name == "mse") return Objective::mse;
+  if (name == "relmse") return Objective::relmse;
+  if (name == "even") return std::nullopt;
+  throw ConfigError(fmt::format("unknown objective \"{}\";{}", name, suggestion(name, kNames)));
+}
+
+Sampler parse_sampler(const std::string& name, const Layout& layout) {
+  constexpr std::array<std::string_view, 3> kNames{"independent", "stratified", "sobol"};
+  for (const Sampler sampler : {Sampler::independent, Sampler::stratified, Sampler::sobol}) {
+    if (name != sampler_name(sampler)) continue;
+    if (sampler != Sampler::independent && layout.contains({GroupKind::film}))
+      throw ConfigError(
+          fmt::format("sampler {}: {} warps the film, and its samples are independent", name, layout.name()));
+    return sampler;
+  }
+  throw ConfigError(fmt::format("unknown sampler \"{}\";{}", name, suggestion(name, kNames)));
+}
+
 std::shared_ptr<const Candidates> MethodTrainer::gather(const Layout& layout, std::uint64_t first, std::uint64_t end,
                                                         const std::function<void(std::uint64_t)>& progress) const {
   const std::uint64_t seed = mix64(m_settings.seed ^ kCandidateStream);
@@ -69,29 +88,30 @@ std::shared_ptr<const Candidates> MethodTrainer::gather(const Layout& layout, st
 std::shared_ptr<const Candidates> MethodTrainer::candidates(const Layout& layout, std::uint64_t count) {
   auto& known = m_candidates[layout.name()];
   if (known && known->size() == count) return known;
-  StageProgress progress(fmt::format("candidates for {}", layout.name()), m_quiet);
+  const Progress progress = m_stages(fmt::format("candidates for {}", layout.name()));
   known = gather(layout, 0, count,
-                 [&](std::uint64_t done) { progress.update(static_cast<double>(done) / static_cast<double>(count)); });
+                 [&](std::uint64_t done) { progress(static_cast<double>(done) / static_cast<double>(count)); });
   return known;
 }
 
 Fit MethodTrainer::train_in_chunks(const Layout& layout, const TrainSettings& settings, const Proposal* init,
                                    PreparedMethod& prepared) {
   const std::uint64_t count = prepared.candidate_count;
-  std::optional<StageProgress> progress(std::in_place, fmt::format("candidates for {}", layout.name()), m_quiet);
+  Progress progress = m_stages(fmt::format("candidates for {}", layout.name()));
   return warpath::train_in_chunks(
       layout, count,
       [&](const auto& take) {
         for (std::uint64_t first = 0; first < count; first += kChunk) {
           const auto chunk = gather(layout, first, std::min(count, first + kChunk), [&](std::uint64_t done) {
-            progress->update(static_cast<double>(first + done) / static_cast<double>(count));
+            progress(static_cast<double>(first + done) / static_cast<double>(count));
           });
           prepared.candidate_seconds += chunk->seconds;
           prepared.candidate_cpu_seconds += chunk->cpu_seconds;
           if (first == 0) prepared.candidates = chunk;
           take(*chunk);
         }
-        progress.emplace("training", m_quiet);
+        progress = {};
+        progress = m_stages("training");
       },
       settings, init);
 }
@@ -138,7 +158,7 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
       prepared.candidate_seconds = prepared.candidates->seconds;
       prepared.candidate_cpu_seconds = prepared.candidates->cpu_seconds;
     }
-    StageProgress progress(fmt::format("training {}", method.name), m_quiet || !prepared.candidates);
+    const Progress progress = prepared.candidates ? m_stages(fmt::format("training {}", method.name)) : Progress();
     fit = train(prepared.candidates ? *prepared.candidates : none, settings, init.get());
   }
   prepared.proposal = std::move(fit.proposal);

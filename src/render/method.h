@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "cli/render_loop.h"
 #include "estimate/image_estimator.h"
+#include "render/render_loop.h"
 #include "tracer/tracer.h"
 #include "train/training_data.h"
 #include "warpath/layout.h"
@@ -24,6 +24,11 @@ struct Method {
 /// Throws ConfigError that lists the families, or FileError if a warp file cannot be read.
 Method parse_method(const std::string& text);
 
+/// The error that samples are placed to lessen: `mse` or `relmse`; none for `even`. Throws ConfigError.
+std::optional<Objective> parse_objective(const std::string& name);
+/// `independent`, `stratified` or `sobol`. Throws ConfigError, also if it does not go with a method of this layout.
+Sampler parse_sampler(const std::string& name, const Layout& layout);
+
 /// A method that is ready to render.
 struct PreparedMethod {
   std::shared_ptr<const Proposal> proposal;  ///< null for `none`
@@ -37,19 +42,23 @@ struct PreparedMethod {
   void add_candidates(ImageEstimator& estimator) const;
 };
 
+/// Told the name of each stage of training as it begins; what it returns hears how far the stage is, and is dropped
+/// when it ends.
+using Stages = std::function<Progress(const std::string& stage)>;
+
 /// Gathers candidates and trains. Candidates are kept, so that methods over the same dimensions learn from the same
 /// ones.
 class MethodTrainer {
  public:
   /// objective: where the samples of methods with a stratified film go, all but those of `none`.
   MethodTrainer(std::shared_ptr<const Tracer> tracer, const TrainSettings& settings, std::filesystem::path init,
-                bool use_samples, std::optional<Objective> objective, bool quiet)
+                bool use_samples, std::optional<Objective> objective, Stages stages = {})
       : m_tracer(std::move(tracer)),
         m_settings(settings),
         m_init(std::move(init)),
         m_use_samples(use_samples),
         m_objective(objective),
-        m_quiet(quiet) {}
+        m_stages(stages ? std::move(stages) : [](const std::string&) -> Progress { return [](double) {}; }) {}
   PreparedMethod prepare(const Method& method);
 
  private:
@@ -66,7 +75,7 @@ class MethodTrainer {
   std::filesystem::path m_init;
   bool m_use_samples;
   std::optional<Objective> m_objective;
-  bool m_quiet;
+  Stages m_stages;
   std::map<std::string, std::shared_ptr<const Candidates>> m_candidates;  // by layout
 };
 
