@@ -29,7 +29,7 @@ if needed.returncode != 0:
 for peer, tests in {"vegas==6.4.1": "the test of its decorators is", "mitsuba==3.9.1": "the tests of warpath.mitsuba are"}.items():
     if pip_install(peer).returncode != 0:
         print(f"{peer} cannot be installed here, so {tests} skipped")
-package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python'}", str(source))
+package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python_package'}", str(source))
 if package.returncode != 0:
     sys.exit(package.stdout + package.stderr)
 # The renderer is linked from what the build folder holds: compiling it once more would take minutes.

@@ -41,7 +41,7 @@ def test_every_family_integrates_without_bias(warp, seeds):
     pulls = []
     for seed in range(seeds):
         integrator = warpath.Integrator([(0, 1)] * 3, warp=warp, seed=seed)
-        integrator(camel, nitn=2, neval=4000)
+        integrator(camel, nitn=3, neval=4000)
         result = integrator(camel, nitn=4, neval=4000, adapt=False)
         pulls.append((result.mean - camel_exact(3)) / result.sdev)
     assert integrator.warp == warp
