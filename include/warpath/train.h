@@ -73,7 +73,7 @@ struct FieldSettings {
   std::uint32_t max_cells = 1 << 15;
   double split_at = 700;  ///< vertices in a cell after which it is cut in two
   double shrink = 32;     ///< a bin is drawn to those around it as if by so many samples of theirs
-  double uniform = 0.4;   ///< share of uniform numbers in every cell; more in cells of few vertices
+  double uniform = 0.4;   ///< share of uniform numbers until cells have found out which one is best for them
   double trust = 4;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
 };
 

@@ -194,7 +194,7 @@ void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& p
         job.indices.push_back(static_cast<std::uint32_t>((guide ? in_pass : in_pixel) / kReplicates));
         job.replicates.push_back(static_cast<std::uint32_t>(replicate));
       }
-      if (guidance.objective) job.weight.push_back(static_cast<float>(spp) / static_cast<float>(counts[pixel]));
+      if (guide) job.weight.push_back(guidance.weight * static_cast<float>(spp) / static_cast<float>(counts[pixel]));
     }
   };
   const auto place_on_film = [&](Job& job) {

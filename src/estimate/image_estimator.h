@@ -35,6 +35,7 @@ struct Guidance {
   const VertexWarp* warp = nullptr;      ///< draws the numbers of vertices; null: they are uniform
   VertexLearner* learner = nullptr;      ///< is shown all vertices
   std::optional<Objective> objective{};  ///< samples go where it says; else every pixel has as many
+  float weight = 1;                      ///< of a sample of this pass: must not depend on the values of this pass
 };
 
 /// Renders one image with one proposal, pass after pass.  [ZZ19, the warped estimator: C(y) W_j / q(y)]

@@ -66,15 +66,20 @@ class Trial {
   double m_plain_error = 0, m_plain_seconds = 0, m_teaching_seconds = 0;
 };
 
+/// Weight of a sample in the pass that begins at `done` samples per pixel, where passes learn: the first ones, drawn by
+/// a warp that knows little, are noisier. It must not depend on what samples bring, so it is a curve that lies near the
+/// reciprocals of the variances that were seen; the optimum is flat.
+float weight_of_pass(int done) { return 0.25f + 0.75f * static_cast<float>(done) / (static_cast<float>(done) + 6); }
+
 /// One pass; what it teaches goes into the guide if another is to follow.
-void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, Guide& guide, const Progress& progress,
-              const std::function<bool()>& stop) {
+void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, float weight, Guide& guide,
+              const Progress& progress, const std::function<bool()>& stop) {
   if (guide.empty()) return estimator.add_pass(spp, progress, stop);
   const bool learns = guide.trainer && teaches;
   const std::uint64_t before = estimator.cost().samples;
   estimator.add_guided_pass(
-      spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective}, progress,
-      stop);
+      spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective, weight},
+      progress, stop);
   if (!learns || g_interrupted) return;
   const Stopwatch clock;
   guide.warp = guide.trainer->fit();
@@ -91,6 +96,7 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
   const double whole = budget.deadline ? std::max(1e-3, left()) : 1;
   double per_spp = 0;  // seconds, of the pass before
   Trial trial(budget.deadline.has_value());
+  const bool online = guide.trainer != nullptr;
   int done = 0;
   while (!g_interrupted) {
     int next = std::max(1, done);
@@ -116,7 +122,8 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
     const auto stop = [&] { return budget.deadline && before > 0 && Clock::now() > *budget.deadline; };
     const auto start = Clock::now();
     const bool teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
-    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), teaches, guide, report, stop);
+    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), teaches, online ? weight_of_pass(done) : 1,
+             guide, report, stop);
     per_spp = seconds_since(start) / next;
     if (guide.automatic && !g_interrupted) trial.judge(estimator, before, per_spp, guide);
     done += next;

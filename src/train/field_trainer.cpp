@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "warpath/error.h"
 
@@ -11,8 +12,14 @@ namespace warpath {
 namespace {
 
 constexpr std::uint16_t kNoBin = 0xffff;
+constexpr std::size_t kKinds = 6;  // of surfaces, see SurfaceKind
 
 constexpr std::size_t kFeatures = FieldTree::kFeatures;
+
+/// In the choice of a share of uniform numbers a draw counts at most as if it were so many times the mean.
+constexpr double kOutshines = 20;
+/// Effective samples of a cell that weigh as much as what the cells like it say.
+constexpr double kLikeOthers = 64;
 
 /// Whether what is scattered depends on where the path came from.
 bool follows_direction(SurfaceKind kind) { return kind != SurfaceKind::diffuse && kind != SurfaceKind::null; }
@@ -27,6 +34,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
     float light, scatter;                  // f / q
     float light_moment, scatter_moment;
+    float inv_q_light, inv_q_scatter;
     FieldTree::Features at;
   };
   Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree)
@@ -54,6 +62,8 @@ class FieldTrainer::Recorder final : public VertexRecorder {
       entry.light_moment = m_squared ? finite(entry.light * entry.light / records.inv_q_light[i]) : entry.light;
       entry.scatter_moment =
           m_squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
+      entry.inv_q_light = records.inv_q_light[i];
+      entry.inv_q_scatter = records.inv_q_scatter[i];
       entries.push_back(entry);
     }
   }
@@ -69,6 +79,23 @@ class FieldTrainer::Recorder final : public VertexRecorder {
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
     : m_settings(settings), m_grids(light_parts) {}
+
+void FieldTrainer::Draws::add(float term, float inv_q) {
+  if (learned > 0) {
+    // A draw that outshines all others would choose alone.
+    const float bound = n > 0 ? static_cast<float>(kOutshines * sum / n) : 0.0f;
+    const float f = std::min(term, bound);
+    // q = 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other share.
+    const float q = 1 / inv_q, beyond_1 = std::max((q - 1) / learned, -1.0f);
+    for (std::size_t s = 0; s < kUniform.size(); ++s) with_share[s] += f * f * q / (1 + (1 - kUniform[s]) * beyond_1);
+  }
+  n += 1, sum += term, square += static_cast<double>(term) * term;
+}
+
+void FieldTrainer::Draws::halve() {
+  n *= 0.5, sum *= 0.5, square *= 0.5;
+  for (float& square_with : with_share) square_with *= 0.5f;
+}
 
 std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const {
   return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass);
@@ -112,12 +139,12 @@ void FieldTrainer::merge(VertexRecorder& recorder) {
       Bin& bin = m_light[e.cell * light_bins + e.light_bin];
       bin.moment += e.light_moment;
       bin.draws += 1;
-      cell.light.add(e.light);
+      cell.light.add(e.light, e.inv_q_light);
     }
     Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
     bin.moment += e.scatter_moment;
     bin.draws += 1;
-    cell.scatter.add(e.scatter);
+    cell.scatter.add(e.scatter, e.inv_q_scatter);
   }
   entries.clear();
 }
@@ -182,7 +209,33 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
   return true;
 }
 
-void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
+FieldTrainer::ByShare FieldTrainer::pool(SurfaceKind kind, Draws Cell::*draws) const {
+  ByShare pooled{};
+  double weights = 0;
+  for (const Cell& cell : m_cells) {
+    const Draws& d = cell.*draws;
+    const double whole = std::accumulate(d.with_share.begin(), d.with_share.end(), 0.0);
+    if (cell.kind != kind || !(whole > 0)) continue;
+    const double weight = d.effective();
+    weights += weight;
+    for (std::size_t s = 0; s < pooled.size(); ++s) pooled[s] += weight * d.with_share[s] / whole;
+  }
+  for (double& p : pooled) p /= std::max(weights, 1.0);
+  return pooled;
+}
+
+double FieldTrainer::best_uniform(const Draws& draws, const ByShare& pooled) const {
+  const double whole = std::accumulate(draws.with_share.begin(), draws.with_share.end(), 0.0);
+  const double weight = whole > 0 ? draws.effective() / whole : 0;
+  double least = HUGE_VAL, best = m_settings.uniform;
+  for (std::size_t s = 0; s < pooled.size(); ++s) {
+    const double square = weight * draws.with_share[s] + kLikeOthers * pooled[s];
+    if (square > 0 && square < least) least = square, best = kUniform[s];
+  }
+  return best;
+}
+
+void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double uniform, Draws& all,
                                CumulativeProbability* density) const {
   const std::uint32_t count = grid.bins();
   static thread_local std::vector<double> moment, drawn, volume, expected;
@@ -208,7 +261,10 @@ void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bin
     if (node >= count) sum += wanted(expected[node]) * volume[node];
   }
   const double effective = all.effective();
-  const double share = sum > 0 ? (1 - m_settings.uniform) * effective / (effective + m_settings.trust) : 0;
+  const double share = sum > 0 ? (1 - uniform) * effective / (effective + m_settings.trust) : 0;
+  all.learned = static_cast<float>(share);
+  // The density will be a better one: what was drawn with it will soon count more.
+  for (float& square_with : all.with_share) square_with *= 0.5f;
   for (std::uint32_t b = 0; b < count; ++b)
     masses[b] = static_cast<float>(volume[count + b] *
                                    (1 - share + (share > 0 ? share * wanted(expected[count + b]) / sum : 0)));
@@ -221,13 +277,19 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
   const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
   const std::size_t light_stored = m_grids.light.stored(), scatter_stored = m_grids.diffuse.stored();
   std::vector<CumulativeProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
+  std::array<ByShare, kKinds> pooled_light, pooled_scatter;
+  for (std::size_t k = 0; k < kKinds; ++k) {
+    pooled_light[k] = pool(static_cast<SurfaceKind>(k), &Cell::light);
+    pooled_scatter[k] = pool(static_cast<SurfaceKind>(k), &Cell::scatter);
+  }
   tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
-    const Cell& cell = m_cells[c];
-    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), cell.light,
-                light.data() + c * light_stored);
+    Cell& cell = m_cells[c];
+    const auto kind = static_cast<std::size_t>(cell.kind);
+    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins),
+                best_uniform(cell.light, pooled_light[kind]), cell.light, light.data() + c * light_stored);
     fit_density(m_grids.grid(VertexNumbers::scatter, cell.kind),
-                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), cell.scatter,
-                scatter.data() + c * scatter_stored);
+                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins),
+                best_uniform(cell.scatter, pooled_scatter[kind]), cell.scatter, scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;
   for (const Cell& cell : m_cells) kinds.push_back(cell.kind);

@@ -27,11 +27,18 @@ class FieldTrainer final : public VertexLearner {
  private:
   class Recorder;
 
+  /// Shares of uniform numbers that a cell chooses from.
+  static constexpr std::array<float, 6> kUniform{0.05f, 0.15f, 0.3f, 0.45f, 0.65f, 0.9f};
+  using ByShare = std::array<double, kUniform.size()>;
+
   /// Sums over draws of one kind of numbers.
   struct Draws {
     double n = 0, sum = 0, square = 0;  // of f / q
-    void add(float term) { n += 1, sum += term, square += static_cast<double>(term) * term; }
-    void halve() { n *= 0.5, sum *= 0.5, square *= 0.5; }
+    /// What the sum of the squares of f / q would be with each share of uniform numbers; recent draws count most.
+    std::array<float, kUniform.size()> with_share{};
+    float learned = 0;  ///< share of the learned density in the field of this pass; 0: there is none
+    void add(float term, float inv_q);
+    void halve();
     /// How many equal samples would tell as much: a few that outshine all others tell little.
     double effective() const { return square > 0 ? sum * sum / square : 0; }
   };
@@ -52,7 +59,13 @@ class FieldTrainer final : public VertexLearner {
   void cut_cells();
   /// extent2: squared width of the scene. Returns false if all vertices of the cell are in one place.
   bool cut(std::uint32_t cell, double extent2);
-  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, const Draws& all,
+  /// Draws::with_share over its sum, averaged over all cells of a kind; 0 if none of them has drawn yet.
+  ByShare pool(SurfaceKind kind, Draws Cell::*draws) const;
+  /// The share of uniform numbers with which a cell's draws would have had the least second moment; `pooled` is what
+  /// cells like it say, and decides where a cell has seen little.
+  double best_uniform(const Draws& draws, const ByShare& pooled) const;
+  /// uniform: share of uniform numbers, if there is enough to learn from.
+  void fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double uniform, Draws& all,
                    CumulativeProbability* density) const;
 
   FieldSettings m_settings;

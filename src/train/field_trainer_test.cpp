@@ -128,6 +128,48 @@ TEST(FieldTrainer, CellsTellPlacesApart) {
   }
 }
 
+/// By draws of the field itself: a quarter of the square brings 5; the rest `rare` once in so many draws, else nothing.
+std::shared_ptr<const Field> taught_by_its_own_draws(float rare) {
+  FieldSettings settings;
+  settings.max_cells = 1;
+  FieldTrainer trainer(settings, 1);
+  auto field = (teach(trainer, Batch(99, kBatch)), trainer.fit());
+  for (std::uint64_t pass = 0; pass < 8; ++pass) {
+    Batch batch(100 + pass, kBatch);
+    std::vector<float> inv_q(kBatch);
+    std::vector<std::uint32_t> places(kBatch);
+    std::array<std::vector<double>, 3> z;
+    for (std::size_t a = 0; a < 3; ++a) z[a].assign(batch.numbers[3 + a].begin(), batch.numbers[3 + a].end());
+    field->locate(batch.context(), kBatch, places.data());
+    field->sample(VertexNumbers::scatter, batch.context(), places.data(), kBatch,
+                  {z[0].data(), z[1].data(), z[2].data()},
+                  {batch.numbers[3].data(), batch.numbers[4].data(), batch.numbers[5].data()}, inv_q.data());
+    for (std::size_t i = 0; i < kBatch; ++i) {
+      const bool bright = batch.numbers[4][i] < 0.5f && batch.numbers[5][i] < 0.5f;
+      const float dim = batch.numbers[6][i] * rare < 1 ? rare : 0;
+      batch.beyond[i] = (bright ? 5 : dim) * inv_q[i];
+    }
+    VertexRecords records = batch.records();
+    records.inv_q_scatter = inv_q.data();
+    const auto recorder = trainer.make_recorder();
+    recorder->record(records);
+    trainer.merge(*recorder);
+    field = trainer.fit();
+  }
+  return field;
+}
+
+TEST(FieldTrainer, SharesOfUniformNumbersAreWhatSuitsTheLight) {
+  const Batch batch(1, 1);
+  const auto brightest = [&](const Field& field) {
+    return density(field, VertexNumbers::scatter, batch, 0, {0.5f, 0.2f, 0.3f});
+  };
+  // f is 5, or 1 on average, 2 in all: the learned density is 2.5 where it is bright. If f has no noise, it is best.
+  EXPECT_GT(brightest(*taught_by_its_own_draws(1)), 1 + 1.5f * 0.8f);
+  // If the root mean square is 5 everywhere, uniform numbers are.
+  EXPECT_LT(brightest(*taught_by_its_own_draws(25)), 1 + 1.5f * 0.4f);
+}
+
 TEST(FieldTrainer, FewVerticesAreNotBelieved) {
   FieldTrainer trainer({}, 1);
   teach(trainer, Batch(1, 2));
