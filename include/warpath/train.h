@@ -71,10 +71,11 @@ struct FieldSettings {
   /// Density of a bin ~ mean of what comes back, or its root mean square, which would be best if it were known well.
   enum class Target { mean, second_moment } target = Target::mean;
   std::uint32_t max_cells = 1 << 15;
-  double split_at = 700;  ///< vertices in a cell after which it is cut in two
-  double shrink = 32;     ///< a bin is drawn to those around it as if by so many samples of theirs
-  double uniform = 0.4;   ///< share of uniform numbers until cells have found out which one is best for them
-  double trust = 4;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
+  double split_at = 2500;  ///< vertices in a cell after which it is cut in two
+  /// A bin is drawn to those around it as if by so many samples of theirs, unless it differs from them for certain.
+  double shrink = 48;
+  double uniform = 0.4;  ///< share of uniform numbers until cells have found out which one is best for them
+  double trust = 1;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
 };
 
 struct GridSettings {
