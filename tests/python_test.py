@@ -26,7 +26,7 @@ needed = pip_install("nanobind>=2.4", "scikit-build-core>=0.10", "numpy", "pytes
 if needed.returncode != 0:
     print("skipped: what the Python package is built with cannot be installed here:", needed.stderr.strip().splitlines()[-1:])
     sys.exit(77)
-for peer, tests in {"vegas==6.4.1": "the test of its decorators is", "mitsuba==3.9.1": "the tests of warpath.mitsuba are"}.items():
+for peer, tests in {"vegas==6.4.1": "the test of its decorators is", "mitsuba==3.9.1": "the tests of warpath.mitsuba are", "matplotlib": "the tutorial is"}.items():
     if pip_install(peer).returncode != 0:
         print(f"{peer} cannot be installed here, so {tests} skipped")
 package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python_package'}", str(source))

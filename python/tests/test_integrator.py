@@ -34,6 +34,19 @@ def test_adapts_and_measures():
     assert result.effective_samples > 0.8 * result.itn_results[-1].neval
 
 
+def test_values_over_hundreds_of_orders_of_magnitude_teach():
+    """Most of the first points are in tails; weights that were scaled by one of those once saturated."""
+
+    def ring(x):
+        return np.exp(-400 * (np.hypot(x[:, 0], x[:, 1]) - 1) ** 2)
+
+    integrator = warpath.Integrator([(-2, 2)] * 2, seed=1)
+    integrator(ring, nitn=8, neval=10_000)
+    result = integrator(ring, nitn=4, neval=10_000, adapt=False)
+    assert abs(result.mean - 2 * math.pi * math.sqrt(math.pi / 400)) < 6 * result.sdev  # a false alarm in 5e8
+    assert result.effective_samples > 0.7 * result.itn_results[-1].neval  # 0.03 for uniform points
+
+
 @pytest.mark.filterwarnings("ignore:iterations differ")  # a few in a hundred do by chance
 @pytest.mark.parametrize("warp, seeds", [("uniform", 10), ("grid", 10), ("kdtree", 10), ("realnvp", 3), ("spline", 3), ("grid+spline", 3)])
 def test_every_family_integrates_without_bias(warp, seeds):

@@ -41,6 +41,7 @@ struct UnderWay {
   std::shared_ptr<const Proposal> proposal;
   ReplicateSums sums;
   Examples examples;
+  std::vector<double> values;  // |f| / q, which become the examples' weights
   std::size_t taken = 0;
 };
 
@@ -53,7 +54,7 @@ struct Integrator::State {
   Learner learner;
   double volume = 1;
   std::uint64_t iterations = 0;  // and samples drawn: each has a number, which seeds it
-  double scale = 0;              // of weights, so that they are floats near 1
+  double scale = 0;              // of all examples' weights, which are floats: the largest of the first iteration is 1
   std::unique_ptr<UnderWay> under_way;
 
   State(std::vector<Interval> b, IntegratorSettings s)
@@ -93,6 +94,17 @@ struct Integrator::State {
     });
   }
 
+  /// Puts the values of an iteration into its examples. Only the largest can set the scale: beside a first one from a
+  /// tail all others would be beyond what floats hold.
+  void scale_weights(UnderWay& now) {
+    if (scale == 0) {
+      const double most = *std::max_element(now.values.begin(), now.values.end());
+      if (most > 0) scale = 1 / std::max(most, 1e-300);
+    }
+    for (std::size_t i = 0; i < now.values.size(); ++i)
+      now.examples.weight[i] = static_cast<float>(std::min(now.values[i] * scale, 1e30));
+  }
+
   double to_unit(std::size_t d, double x) const {
     return std::clamp((x - bounds[d].low) / (bounds[d].high - bounds[d].low), 0.0, std::nextafter(1.0, 0.0));
   }
@@ -115,6 +127,7 @@ std::size_t Integrator::begin(std::size_t neval) {
   now->proposal = m_state->learner.proposal(now->points.second_share());
   const std::size_t count = now->points.count(), rows = std::min(count, m_state->settings.memory);
   now->examples = {Matrix<float>(rows, m_state->bounds.size()), std::vector<float>(rows), std::vector<float>(rows)};
+  now->values.resize(rows);
   m_state->under_way = std::move(now);
   return count;
 }
@@ -137,10 +150,7 @@ void Integrator::add(Batch<const double> x, std::span<const double> weight, Batc
     const std::size_t row = now.taken + i;
     for (std::size_t d = 0; d < x.cols(); ++d) examples.y(row, d) = to_primary(m_state->to_unit(d, x(i, d)));
     const double value = std::abs(weight[i] * f(i, 0));
-    if (std::isfinite(value) && value > 0) {
-      if (m_state->scale == 0) m_state->scale = 1 / value;
-      examples.weight[row] = static_cast<float>(std::min(value * m_state->scale, 1e30));
-    }
+    now.values[row] = std::isfinite(value) ? value : 0;
     examples.inv_q[row] = static_cast<float>(weight[i] / m_state->volume);
   }
   now.taken += f.rows();
@@ -155,6 +165,7 @@ Iteration Integrator::end(bool adapt) {
   if (!adapt) return result;
   result.adapted = true;
   const double relative = result.mean[0] == 0 ? 0 : result.sdev() / std::abs(result.mean[0]);
+  m_state->scale_weights(*now);
   const std::uint64_t before = m_state->learner.trained();
   m_state->learner.learn(std::move(now->examples), relative * relative * static_cast<double>(result.neval));
   result.trained = m_state->learner.trained() - before;
