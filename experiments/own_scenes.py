@@ -18,14 +18,14 @@ def coins(epps=(1, 4, 64)):
 
     The small sets are resampled from 64 candidates for each example: among eight of them there are too few that hit a caustic.
     """
-    film = {**FILM, "size": "208x117", **SHARE}
+    film = {**FILM, "max_depth": 4, "defines": {"bulb": 7}, **SHARE}
     scene, options = own_scene("coins"), {**SIZES, **film}
     against = render_reference("coins", scene, 1024, "kdtree:film+bounce1", examples=640000, **film)
     base = compare("coins/baselines", scene, ["none", "uniform:film+bounce1"], **options, **against)
     table, lines, everything = comparison_table(base), {}, list(base)
     for epp in epps:
         more = {"alpha": 64} if epp < 64 else {}
-        results = compare(f"coins/epp-{epp}", scene, WARPS_4D, **options, examples=epp * 100 * 100, **against, **more)
+        results = compare(f"coins/epp-{epp}", scene, WARPS_4D, **options, examples=epp * 100 * 100, max_steps=600, **against, **more)
         table += rows_of(results, base, f"epp-{epp}")
         for method in WARPS_4D:
             lines.setdefault(method, []).append((epp, *gain(of_method(base, "none"), of_method(results, method), "mse")))
@@ -34,7 +34,7 @@ def coins(epps=(1, 4, 64)):
     write_table(folder, table)
     line_chart(folder / "gain.svg", "training set, epp x 100 x 100", "gain in MSE over plain path tracing", lines, rule=1)
     error_charts(folder, everything)
-    close_up = {"exposure": 1.0, "crop": (0.10, 0.18, 0.42, 0.50), "zoom": 4}
+    close_up = {"exposure": 0.1, "crop": (0.10, 0.18, 0.42, 0.50), "zoom": 5}
     pictures = images_of(folder / "baselines", ["none"], **close_up)
     pictures[1:1] = images_of(folder / f"epp-{epps[-1]}", WARPS_4D, **close_up)[:-1]
     write_png(folder / "close-ups.png", stacked([side_by_side(pictures[:2]), side_by_side(pictures[2:])]))
@@ -50,7 +50,7 @@ def billiards():
     folder = folder_of("billiards")
     write_table(folder, comparison_table(results))
     error_charts(folder, results)
-    write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(images_of(folder, ["none", *WARPS_4D]))]))
+    write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(images_of(folder, ["none", *WARPS_4D], zoom=2))]))
     # The white ball's streak alone, where the place on the film depends on time: the true density, kd-tree, Real NVP.
     compare("billiards/streak", scene, blurred, **{**options, "runs": 1, "spp": 1}, reference_spp=8, **crop(FILM, 0.08, 0.50, 0.31, 0.29))
     true_and_learned = [densities_of(folder / "streak", blurred, *axes) for axes in (("film.x", "time"), ("film.x", "film.y"))]
@@ -85,7 +85,7 @@ def light_choice(label, depth, dims):
     folder = folder_of(label)
     write_table(folder, comparison_table(results))
     error_charts(folder, results)
-    shown = images_of(folder, ["none", f"kdtree:{LIGHT}", f"realnvp:{LIGHT}"])
+    shown = images_of(folder, ["none", f"kdtree:{LIGHT}", f"realnvp:{LIGHT}"], zoom=2)
     write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(shown)]))
 
 
@@ -95,12 +95,12 @@ def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
     The number of examples and of training steps is the same, so only their quality differs.
     """
     scene, film = own_scene("billiards"), {**FILM, "size": "128x72"}
-    measure = {**film, "spp": 32, "runs": 4, **render_reference("alpha", scene, 512, "field", objective="mse", **film)}
+    measure = {**film, "spp": 32, "runs": 4, **render_reference("alpha", scene, 256, "field", objective="mse", **film)}
     base = compare("alpha/baselines", scene, ["none", "uniform:film+bounce1"], **measure)
     table = ["| α | candidates | candidates, CPU s | resampling, CPU s | gain over uniform | held-out loss |", "|---|---|---|---|---|---|"]
     line, times = [], []
     for a in alphas:
-        runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, epp=1, max_steps=300)
+        runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, epp=1, max_steps=200)
         gained, error = gain(of_method(base, "uniform:film+bounce1"), runs, "mse")
         gathering = mean(column(runs, "candidate_cpu_seconds"))
         resampling = mean([run["train_cpu_seconds"] - run["training_curve"][-1]["cpu_seconds"] for run in runs])

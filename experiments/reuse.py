@@ -33,7 +33,7 @@ def reuse():
         for start, init in (("from scratch", {}), ("reused weights", {"init": weights})):
             for steps in STEPS:
                 label = f"reuse/{angle}/{start.replace(' ', '-')}-{steps}"
-                runs = compare(label, scene, [WARP], **turned, **measure, epp=2, max_steps=steps, **init)
+                runs = compare(label, scene, [WARP], **turned, **measure, epp=1, max_steps=steps, **init)
                 loss = [run["training_curve"][-1]["held_out"] for run in runs]
                 seconds = mean([run["train_cpu_seconds"] for run in runs])
                 gained = gain(of_method(base, "uniform:film+bounce1"), runs, "mse")

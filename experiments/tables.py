@@ -42,13 +42,22 @@ def equal_time_gain(baseline, runs, key):
     return gain(*of_time, "cost")
 
 
+def pays_after(baseline, runs):
+    """CPU seconds after which a method's MSE is below the baseline's, whatever was spent on training counted; infinite if it never is."""
+    plain = mean(column(baseline, "mse")) * mean(column(baseline, "total_cpu_seconds"))
+    rendering = mean([run["warp_cpu_seconds"] + run["trace_cpu_seconds"] for run in runs])
+    training = mean([run["candidate_cpu_seconds"] + run["train_cpu_seconds"] for run in runs])
+    warped = mean(column(runs, "mse")) * rendering
+    return training * plain / (plain - warped) if warped < plain else math.inf
+
+
 PHASES = ("candidate", "train", "warp", "trace")
 
 
 def comparison_table(results, baseline="none"):
-    """Markdown: for each method errors, gains over the baseline (equal samples, equal time) and over `uniform` of the same numbers,
-    CPU seconds of each phase."""
-    lines = ["| method | runs | MSE | gain | over uniform | at equal time | relMSE | gain | at equal time | candidates | training | warping | tracing |",
+    """Markdown: for each method errors, gains over the baseline and over `uniform` of the same numbers, the gain in MSE at equal time,
+    CPU seconds after which it pays, and those of each phase."""
+    lines = ["| method | runs | MSE | gain | over uniform | relMSE | gain | gain at equal time | pays after, s | candidates | training | warping | tracing |",
              "|" + "---|" * 13]  # fmt: skip
     return lines + rows_of(results, results, baseline=baseline)
 
@@ -66,7 +75,7 @@ def rows_of(results, baselines, extra=None, baseline="none"):
             cells.append("{:.2f} ± {:.2f}".format(*gain(base, runs, key)))
             if key == "mse":
                 cells.append("{:.2f} ± {:.2f}".format(*gain(uniform, runs, key)) if uniform else "")
-            cells.append(f"{equal_time_gain(base, runs, key)[0]:.2f}")
+        cells += [f"{equal_time_gain(base, runs, 'mse')[0]:.2f}", "" if method == baseline else f"{pays_after(base, runs):.0f}".replace("inf", "never")]
         cells += [f"{mean(column(runs, f'{phase}_cpu_seconds')):.1f}" for phase in PHASES]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
