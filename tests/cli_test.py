@@ -62,6 +62,8 @@ class CommandLine(unittest.TestCase):
         self.fails(2, "train", BOX, "--warp", "none", "-o", self.path("a.warp"), says=["nothing to train"])
         self.fails(2, "train", BOX, "--warp", "auto", "-o", self.path("a.warp"), says=["nothing to train"])
         self.fails(2, "render", BOX, "--warp", "field:film", "-o", self.path("a.exr"), says=["no dimensions to choose"])
+        self.fails(2, "render", BOX, "--warp", "neural:film+bounce1", "-o", self.path("a.exr"), says=["neural:film+bounce1", "light_uv"])
+        self.fails(2, "render", BOX, "--warp", "neural:bounce1", "-o", self.path("a.exr"), says=["bounce1.lobe+bounce1.dir"])
         self.fails(2, "render", BOX, "--warp", "field", "--objective", "mape", "-o", self.path("a.exr"), says=["--objective"])
 
     def test_bad_files_exit_with_3(self):
@@ -78,7 +80,7 @@ class CommandLine(unittest.TestCase):
             self.fails(3, "render", BOX, "--warp", warp, "-o", self.path("a.exr"), says=["broken.warp"])
 
     def test_same_seed_same_file_for_any_number_of_threads(self):
-        for warp in ("none", "kdtree:film+bounce1", "field", "auto"):
+        for warp in ("none", "kdtree:film+bounce1", "field", "neural", "auto"):
             images = []
             for threads in (1, 2):
                 out = self.path(f"{threads}.exr")
@@ -119,6 +121,19 @@ class CommandLine(unittest.TestCase):
         result = self.warpath("render", BOX, "--warp", "auto", "--spp", 32, "-o", out, *SMALL)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("auto: ", result.stderr)
+
+    def test_a_network_is_saved_with_the_numbers_that_it_warps(self):
+        warp, out = self.path("box.warp"), self.path("out.exr")
+        for method, what in (("neural", "every vertex"), ("neural:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir")):
+            result = self.warpath("train", BOX, "--warp", method, "-o", warp, "--examples", 2048, "--batch", 256, *SMALL)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            told = self.warpath("inspect", warp).stdout
+            for text in ("neural", what, "paths"):
+                self.assertIn(text, told)
+            for spelled in (warp, method):
+                result = self.warpath("render", BOX, "--warp", spelled, "--spp", 7, "-o", out, *SMALL)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn(f"{32 * 24 * 7} samples", result.stderr)
 
     def test_compare_writes_report_and_results(self):
         report = self.path("report")

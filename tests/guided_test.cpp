@@ -1,5 +1,5 @@
-// Passes that learn from those before them, by a field at every vertex and by counts of samples per pixel, give the
-// image of plain path tracing, and the same bits for any number of threads.
+// Passes that learn from those before them, by a field or a network at every vertex and by counts of samples per pixel,
+// give the image of plain path tracing, and the same bits for any number of threads.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -11,6 +11,7 @@
 #include "estimate/image_estimator.h"
 #include "scene/scene.h"
 #include "train/field_trainer.h"
+#include "train/neural_trainer.h"
 
 namespace warpath {
 namespace {
@@ -31,17 +32,28 @@ const Tracer& box_tracer(int width, int height) {
   return *tracer;
 }
 
+/// What is to learn: cells and steps are small, so that a few samples teach much.
+std::unique_ptr<VertexTrainer> make_trainer(const std::string& family, const Tracer& tracer) {
+  NeuralSettings settings;
+  settings.field.split_at = 200;
+  settings.batch = 256;
+  settings.rate = 5e-3;
+  settings.min_visits = 4096;
+  if (family == "field") return std::make_unique<FieldTrainer>(settings.field, tracer.emitters());
+  if (family == "neural:bounce1") settings.numbers = Layout::parse("bounce1.lobe+bounce1");
+  if (family != "none") return std::make_unique<NeuralTrainer>(settings, tracer.emitters(), 1);
+  return nullptr;
+}
+
 /// Passes of `spp` samples per pixel, each guided by those before it.
 ImageEstimate guided(const Tracer& tracer, const std::vector<int>& spp, std::optional<Objective> objective,
-                     bool with_field, std::uint64_t seed) {
+                     const std::string& family, std::uint64_t seed) {
   ImageEstimator estimator(tracer, {}, nullptr, seed);
-  FieldSettings settings;
-  settings.split_at = 200;
-  FieldTrainer trainer(settings, tracer.emitters());
-  std::shared_ptr<const Field> field;
+  const auto trainer = make_trainer(family, tracer);
+  std::shared_ptr<const VertexWarp> warp;
   for (const int n : spp) {
-    estimator.add_guided_pass(n, {field.get(), with_field ? &trainer : nullptr, objective});
-    if (with_field) field = trainer.fit();
+    estimator.add_guided_pass(n, {warp.get(), trainer.get(), objective});
+    if (trainer) warp = trainer->warp();
   }
   return estimator.develop_rest();
 }
@@ -90,15 +102,29 @@ Spread plain(const Tracer& tracer, int runs, int spp) {
   return spread;
 }
 
+const Spread& reference_of_box() {
+  static const Spread spread = plain(box_tracer(12, 8), 64, 512);
+  return spread;
+}
+
 TEST(Guided, FieldsAndAllocationLeaveEveryPixelsMeanAsItIs) {
   const Tracer& tracer = box_tracer(12, 8);
-  const Spread reference = plain(tracer, 64, 512);
   for (const auto objective :
        {std::optional<Objective>{}, std::optional(Objective::mse), std::optional(Objective::relmse)}) {
     Spread spread;
     for (std::uint64_t seed = 0; seed < 200; ++seed)
-      spread.add(guided(tracer, {16, 16, 32, 64}, objective, true, seed));
-    expect_same_means(spread, reference, 0.01);
+      spread.add(guided(tracer, {16, 16, 32, 64}, objective, "field", seed));
+    expect_same_means(spread, reference_of_box(), 0.01);
+  }
+}
+
+TEST(Guided, NetworksLeaveEveryPixelsMeanAsItIs) {
+  const Tracer& tracer = box_tracer(12, 8);
+  for (const char* family : {"neural", "neural:bounce1"}) {
+    Spread spread;
+    for (std::uint64_t seed = 0; seed < 200; ++seed)
+      spread.add(guided(tracer, {16, 16, 32, 64}, Objective::relmse, family, seed));
+    expect_same_means(spread, reference_of_box(), 0.01);
   }
 }
 
@@ -108,35 +134,49 @@ TEST(Guided, CountsThatFollowFirefliesDoNotBiasThem) {
   const Tracer& tracer = box_tracer(4, 3);
   const Spread reference = plain(tracer, 64, 16384);
   Spread spread;
-  for (std::uint64_t seed = 0; seed < 20000; ++seed) spread.add(guided(tracer, {4, 4}, Objective::mse, false, seed));
+  for (std::uint64_t seed = 0; seed < 20000; ++seed) spread.add(guided(tracer, {4, 4}, Objective::mse, "none", seed));
   expect_same_means(spread, reference, 0.005);
 }
 
 TEST(Guided, SameSeedSameBitsForAnyNumberOfThreads) {
-  const auto bits = [](int threads) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-    return guided(box_tracer(48, 32), {2, 2, 4, 8}, Objective::relmse, true, 7).mean;
-  };
-  const auto one = bits(1), two = bits(2), again = bits(2);
-  ASSERT_EQ(one.size(), two.size());
-  EXPECT_EQ(std::memcmp(one.data(), two.data(), one.size() * sizeof(Color)), 0);
-  EXPECT_EQ(std::memcmp(two.data(), again.data(), one.size() * sizeof(Color)), 0);
+  for (const char* family : {"field", "neural"}) {
+    const auto bits = [&](int threads) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+      return guided(box_tracer(48, 32), {2, 2, 4, 8}, Objective::relmse, family, 7).mean;
+    };
+    const auto one = bits(1), two = bits(2), again = bits(2);
+    ASSERT_EQ(one.size(), two.size());
+    EXPECT_EQ(std::memcmp(one.data(), two.data(), one.size() * sizeof(Color)), 0) << family;
+    EXPECT_EQ(std::memcmp(two.data(), again.data(), one.size() * sizeof(Color)), 0) << family;
+  }
 }
 
-// A field that helps nothing would pass all else.
-TEST(Guided, FieldLessensTheVariance) {
+// A warp that helps nothing would pass all else.
+TEST(Guided, WarpsLessenTheVariance) {
   const Tracer& tracer = box_tracer(48, 32);
-  double guided_variance = 0, plain_variance = 0;
-  ImageEstimator estimator(tracer, {}, nullptr, 5);
-  FieldTrainer trainer({}, tracer.emitters());
-  for (int pass = 0; pass < 8; ++pass) estimator.add_guided_pass(64, {nullptr, &trainer, std::nullopt});
-  const auto field = trainer.fit();
-  ImageEstimator with(tracer, {}, nullptr, 6), without(tracer, {}, nullptr, 6);
-  with.add_guided_pass(64, {field.get(), nullptr, std::nullopt});
-  without.add_pass(64);
-  for (const Color& v : with.develop_rest().variance) guided_variance += luminance(v);
-  for (const Color& v : without.develop_rest().variance) plain_variance += luminance(v);
-  EXPECT_LT(guided_variance, 0.9 * plain_variance);
+  const auto variance = [&](const VertexWarp* warp) {
+    ImageEstimator estimator(tracer, {}, nullptr, 6);
+    if (warp)
+      estimator.add_guided_pass(64, {warp, nullptr, std::nullopt});
+    else
+      estimator.add_pass(64);
+    double sum = 0;
+    for (const Color& v : estimator.develop_rest().variance) sum += luminance(v);
+    return sum;
+  };
+  const double plain_variance = variance(nullptr);
+  for (const char* family : {"field", "neural"}) {
+    ImageEstimator estimator(tracer, {}, nullptr, 5);
+    std::unique_ptr<VertexTrainer> trainer = std::make_unique<FieldTrainer>(FieldSettings{}, tracer.emitters());
+    if (std::string(family) == "neural")
+      trainer = std::make_unique<NeuralTrainer>(NeuralSettings{}, tracer.emitters(), 1);
+    std::shared_ptr<const VertexWarp> warp;
+    for (int pass = 0; pass < 8; ++pass) {
+      estimator.add_guided_pass(64, {nullptr, trainer.get(), std::nullopt});
+      warp = trainer->warp();
+    }
+    EXPECT_LT(variance(warp.get()), 0.9 * plain_variance) << family;
+  }
 }
 
 }  // namespace

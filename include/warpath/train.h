@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "warpath/layout.h"
 #include "warpath/warp.h"
 
 namespace warpath {
@@ -78,6 +79,22 @@ struct FieldSettings {
   double trust = 1;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
 };
 
+/// Size of the network that corrects a field.
+struct NeuralShape {
+  int width = 32, blocks = 0;  ///< of the residual network
+  int position_bins = 8;       ///< of the one-blob encoding of a vertex's position, along each axis
+};
+
+struct NeuralSettings : NeuralShape {
+  FieldSettings field;   ///< that it corrects
+  Layout numbers;        ///< that are warped: bounce1.lobe+bounce1.dir, ...; empty: those of every vertex
+  double rate = 5e-4;    ///< step size of Adam; falls to a tenth in the training after each pass
+  int batch = 1024;      ///< vertices in a training step
+  double visits = 0.1;   ///< vertices trained on, over those of a pass,
+  int min_visits = 1 << 18;  ///< and at least
+  double clip = 20;      ///< what comes back counts as so many times its mean at most: in training only
+};
+
 struct GridSettings {
   int bins = 128;  ///< intervals in each dimension
   int iterations = 10;
@@ -94,6 +111,7 @@ struct TrainSettings {
   std::uint64_t seed = 0;
   RealNvpSettings realnvp;
   SplineSettings spline;
+  NeuralSettings neural;
   KdTreeSettings kdtree;
   GridSettings grid;
   FieldSettings field;

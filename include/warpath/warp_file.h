@@ -15,8 +15,9 @@ class VertexWarp;
 struct WarpFile {
   std::shared_ptr<const Proposal> proposal;       ///< null for a warp of vertices
   std::shared_ptr<const VertexWarp> vertex_warp;  ///< null for a proposal
-  Layout layout;      ///< the dimensions that a proposal warps, as many as it has; empty for a warp of vertices
-  std::string scene;  ///< name of the scene, for people
+  /// The dimensions that a proposal warps, as many as it has; those that a warp of vertices draws, empty for all.
+  Layout layout;
+  std::string scene;                            ///< name of the scene, for people
   std::map<std::string, std::string> settings;  ///< of the training, by name
 };
 

@@ -41,7 +41,7 @@ void add_options(CLI::App& app, TrainingOptions& options) {
       "Whether candidates count in the image: discard (as the paper does) or use")
       ->check(CLI::IsMember({"discard", "use"}));
 
-  constexpr auto kFlow = "Real NVP and spline";
+  constexpr auto kFlow = "Real NVP and spline (neural: width, blocks, rate and batch, with its own defaults)";
   const auto add_flow = [&](const char* name, auto& value, const char* help) {
     return app.add_option(name, value, help)->group(kFlow);
   };
@@ -140,7 +140,8 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
       ->capture_default_str();
   sub->add_option(
          "--warp", command.warp,
-         "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field, auto")
+         "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field, "
+         "neural, auto")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");
@@ -152,7 +153,8 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
 CLI::App* add_command(CLI::App& app, TrainCommand& command) {
   CLI::App* sub = app.add_subcommand("train", "Train a warp and save it");
   sub->add_option("scene", command.common.scene, "Mitsuba 3 scene file")->required();
-  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline; or field")->required();
+  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline; or field, neural")
+      ->required();
   sub->add_option("-o,--output", command.output, "File to write (safetensors)")->required();
   add_options(*sub, command.common);
   add_options(*sub, command.training);

@@ -12,7 +12,7 @@ namespace {
 void inspect_warp(const std::filesystem::path& path) {
   const WarpFile warp = load_warp(path);
   fmt::print("family      {}\n", family_of(warp));
-  if (warp.proposal)
+  if (warp.proposal || warp.layout.dims() > 0)
     fmt::print("dimensions  {} ({})\n", warp.layout.dims(), warp.layout.name());
   else
     fmt::print("dimensions  light, light_uv, lobe and dir of every vertex\n");

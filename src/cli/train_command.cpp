@@ -21,7 +21,7 @@ void save(const TrainCommand& command, WarpFile file, const TrainSettings& setti
 }
 
 /// Learns from passes that render as many paths as other families take candidates.
-void train_field(const TrainCommand& command, const Tracer& tracer, const TrainSettings& settings, Guide guide) {
+void train_on_passes(const TrainCommand& command, const Tracer& tracer, const TrainSettings& settings, Guide guide) {
   const FilmSettings& film = tracer.scene().film;
   const double paths = settings.alpha * static_cast<double>(settings.examples);
   Budget budget;
@@ -30,16 +30,17 @@ void train_field(const TrainCommand& command, const Tracer& tracer, const TrainS
   const auto clock = start_clock();
   ImageEstimator estimator(tracer, {}, nullptr, settings.seed);
   {
-    StageProgress progress("training field", command.common.quiet);
+    StageProgress progress("training " + command.warp, command.common.quiet);
     render_passes(estimator, budget, guide, progress.callback(), [] {});
   }
   if (!guide.warp || g_interrupted) throw Interrupted{};
   WarpFile file;
   file.vertex_warp = guide.warp;
+  file.layout = parse_method(command.warp).layout;
   file.scene = tracer.scene().file.filename().string();
   file.settings = {{"paths", std::to_string(guide.taught)}, {"train_seconds", fmt::format("{:.3f}", clock())}};
   save(command, std::move(file), settings);
-  log::info("{}: field from {} paths, {:.1f} s", command.output.string(), guide.taught, clock());
+  log::info("{}: {} from {} paths, {:.1f} s", command.output.string(), command.warp, guide.taught, clock());
 }
 
 }  // namespace
@@ -49,14 +50,15 @@ void run(const TrainCommand& command) {
   const Threads threads(common);
   const Method method = parse_method(command.warp);
   if (method.family == "none" || method.family == "uniform" || method.family == "auto" || !method.file.empty())
-    throw ConfigError(fmt::format(
-        "--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp or spline, or field",
-        command.warp));
+    throw ConfigError(
+        fmt::format("--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp or spline, or "
+                    "field or neural",
+                    command.warp));
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
   const TrainSettings settings = command.training.train_settings(common.seed);
   MethodTrainer trainer(tracer, settings, command.training.init, false, std::nullopt, terminal_stages(common.quiet));
   PreparedMethod prepared = trainer.prepare(method);
-  if (prepared.guide.trainer) return train_field(command, *tracer, settings, std::move(prepared.guide));
+  if (prepared.guide.trainer) return train_on_passes(command, *tracer, settings, std::move(prepared.guide));
 
   WarpFile file;
   file.proposal = prepared.proposal;

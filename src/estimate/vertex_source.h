@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/primary_source.h"
+#include "core/vertex_context_buffer.h"
 #include "warp/vertex_warp.h"
 
 namespace warpath {
@@ -13,8 +14,9 @@ namespace warpath {
 struct VertexSourceScratch {
   std::array<std::vector<double>, 3> z;
   std::array<std::vector<float>, 3> y;
-  std::vector<std::uint32_t> places, place_of_lane;
-  std::vector<std::uint16_t> located;  // lane -> bounce at which it was located last
+  std::vector<std::uint32_t> places, place_of_lane;  // words of places, as many for each as the warp wants
+  std::vector<std::uint16_t> located;                // lane -> bounce at which it was located last
+  VertexContextBuffer unknown;                       // those that are to be located one by one
 };
 
 /// From a warp that lives at vertices to the numbers of a path: film positions as they are given, the numbers of each
@@ -26,7 +28,7 @@ class VertexSource final : public UniformSource {
   VertexSource(const Latents& latents, const VertexWarp& warp, std::span<const float> film_x,
                std::span<const float> film_y, VertexSourceScratch& scratch)
       : UniformSource(latents), m_warp(warp), m_film_x(film_x), m_film_y(film_y), m_scratch(scratch) {
-    scratch.place_of_lane.resize(latents.size());
+    scratch.place_of_lane.resize(latents.size() * warp.place_size());
     scratch.located.assign(latents.size(), 0);
   }
 

@@ -6,6 +6,8 @@
 #include "core/rng.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
+#include "train/field_trainer.h"
+#include "train/neural_trainer.h"
 #include "train/train.h"
 #include "warpath/error.h"
 #include "warpath/warp_file.h"
@@ -13,8 +15,8 @@
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 8> kFamilies{"none",    "uniform", "grid",  "kdtree",
-                                                    "realnvp", "spline",  "field", "auto"};
+constexpr std::array<std::string_view, 9> kFamilies{"none",   "uniform", "grid",   "kdtree", "realnvp",
+                                                    "spline", "field",   "neural", "auto"};
 constexpr std::string_view kDefaultDimensions = "film+bounce1";
 
 /// Candidates are drawn from other numbers than the image, whatever its seed.
@@ -44,6 +46,15 @@ Method parse_method(const std::string& text) {
     if (colon != std::string::npos)
       throw ConfigError(fmt::format("\"{}\": `none` has no dimensions; uniform:{} draws those at random", text,
                                     text.substr(colon + 1)));
+    return method;
+  }
+  if (method.family == "neural") {
+    if (colon != std::string::npos) method.layout = Layout::parse(std::string_view(text).substr(colon + 1));
+    try {
+      check_vertex_numbers(method.layout);
+    } catch (const ConfigError& error) {
+      throw ConfigError(fmt::format("\"{}\": {}", text, error.what()));
+    }
     return method;
   }
   if (method.family == "field" || method.family == "auto") {
@@ -134,6 +145,13 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     const WarpFile file = load_warp(method.file);
     prepared.proposal = file.proposal;
     prepared.guide.warp = file.vertex_warp;
+    return prepared;
+  }
+  if (method.family == "neural") {
+    NeuralSettings settings = m_settings.neural;
+    settings.field = m_settings.field;
+    settings.numbers = method.layout;
+    prepared.guide.trainer = std::make_unique<NeuralTrainer>(settings, m_tracer->emitters(), m_settings.seed);
     return prepared;
   }
   if (method.family == "field" || method.family == "auto") {

@@ -82,7 +82,7 @@ void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, flo
       progress, stop);
   if (!learns || g_interrupted) return;
   const Stopwatch clock;
-  guide.warp = guide.trainer->fit();
+  guide.warp = guide.trainer->warp();
   guide.taught += estimator.cost().samples - before;
   guide.fit_seconds += clock.wall();
   guide.fit_cpu_seconds += clock.cpu();

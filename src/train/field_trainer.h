@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/vertex_recorder.h"
+#include "train/vertex_trainer.h"
 #include "warp/field.h"
 #include "warpath/train.h"
 
@@ -14,7 +14,7 @@ namespace warpath {
 /// Learns a field from the vertices of passes. The density of a bin goes with the mean of what comes back, or with the
 /// root of its second moment, which makes the variance of the whole remaining path least [Vorba et al. 2019, Path
 /// Guiding in Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding] but is known less well.
-class FieldTrainer final : public VertexLearner {
+class FieldTrainer final : public VertexTrainer {
  public:
   /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
   FieldTrainer(const FieldSettings& settings, int light_parts);
@@ -23,6 +23,12 @@ class FieldTrainer final : public VertexLearner {
   void merge(VertexRecorder& recorder) override;
   /// The field after all passes so far; cells that have seen many vertices are cut for the passes to come.
   std::shared_ptr<const Field> fit();
+  std::shared_ptr<const VertexWarp> warp() override { return fit(); }
+  /// Mean of what came back to the vertices of a cell of the last field.
+  double mean(VertexNumbers which, std::uint32_t cell) const {
+    const Draws& draws = which == VertexNumbers::light ? m_cells[cell].light : m_cells[cell].scatter;
+    return draws.n > 0 ? draws.sum / draws.n : 0;
+  }
 
  private:
   class Recorder;

@@ -44,6 +44,10 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   give(blocks, result.spline.blocks);
   give(encoding_bins, result.spline.encoding_bins);
   give(rate, result.spline.rate);
+  give(width, result.neural.width);
+  give(blocks, result.neural.blocks);
+  give(rate, result.neural.rate);
+  give(batch, result.neural.batch);
   give(bins, result.spline.bins);
   give(bins, result.grid.bins);
   const bool likelihood = is_second("loss", loss, "variance", "likelihood");

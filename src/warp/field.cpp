@@ -47,6 +47,7 @@ Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, s
 }
 
 const CumulativeProbability* Field::density(VertexNumbers which, std::uint32_t cell) const {
+  if (cell == FieldTree::kNoCell) return nullptr;
   return which == VertexNumbers::light ? m_light.data() + cell * m_grids.light.stored()
                                        : m_scatter.data() + cell * m_grids.diffuse.stored();
 }

@@ -42,10 +42,12 @@ class Field final : public VertexWarp {
   static std::shared_ptr<const Field> load(const TensorFile& file, const std::string& prefix);
 
   const FieldTree& tree() const { return m_tree; }
+  const FieldGrids& grids() const { return m_grids; }
 
- private:
+  /// The density of a cell; null for FieldTree::kNoCell.
   const CumulativeProbability* density(VertexNumbers which, std::uint32_t cell) const;
 
+ private:
   FieldTree m_tree;
   FieldGrids m_grids;
   std::vector<SurfaceKind> m_kinds;  // of each cell

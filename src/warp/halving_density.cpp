@@ -155,14 +155,20 @@ bool HalvingGrid::Walk::step() {
   return true;
 }
 
-float HalvingGrid::Walk::finish(std::array<float, 3>& y) const {
+std::array<float, 3> HalvingGrid::point(const std::array<std::uint32_t, 3>& place,
+                                        const std::array<double, 3>& z) const {
+  std::array<float, 3> y;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double unit = m_grid->m_unit[a];
     // The last float below the bin's end: the sample must not leave the bin whose density it is divided by.
-    const float begin = static_cast<float>(m_place[a] * unit);
-    const float end = static_cast<float>((m_place[a] + 1) * unit);
-    y[a] = std::clamp(static_cast<float>((m_place[a] + m_z[a]) * unit), begin, below(end));
+    const float begin = static_cast<float>(place[a] * m_unit[a]);
+    const float end = static_cast<float>((place[a] + 1) * m_unit[a]);
+    y[a] = std::clamp(static_cast<float>((place[a] + z[a]) * m_unit[a]), begin, below(end));
   }
+  return y;
+}
+
+float HalvingGrid::Walk::finish(std::array<float, 3>& y) const {
+  y = m_grid->point(m_place, m_z);
   return static_cast<float>(m_grid->m_whole / m_probability);
 }
 

@@ -20,7 +20,11 @@ class VertexWarp {
  public:
   virtual ~VertexWarp() = default;
   virtual std::string family() const = 0;
-  /// What the warp finds out about n vertices once, for all the numbers that are drawn there.
+  /// Whether these numbers of the bounce-th vertex are its own; else they are uniform.
+  virtual bool warps(VertexNumbers, std::uint16_t /*bounce*/) const { return true; }
+  /// How many 32-bit words what is found out about a vertex takes.
+  virtual std::size_t place_size() const { return 1; }
+  /// What the warp finds out about n vertices once, for all the numbers that are drawn there: place_size() words each.
   virtual void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const = 0;
   /// Draws the numbers of n vertices, located before. z: three arrays of n uniform latents in [0,1); y: three arrays of
   /// n numbers in [0,1); inv_q: n, 1 / q of the y that were handed out, given the context.

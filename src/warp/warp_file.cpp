@@ -3,6 +3,7 @@
 #include "core/tensor_file.h"
 #include "warp/field.h"
 #include "warp/load.h"
+#include "warp/neural.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -13,7 +14,6 @@ namespace {
 constexpr std::string_view kFormat = "warpath 1";
 const std::string kPrefix = "warp.";
 const std::string kSetting = "setting.";
-constexpr std::string_view kField = "field";
 
 }  // namespace
 
@@ -45,8 +45,12 @@ WarpFile load_warp(const std::filesystem::path& path) {
     throw FileError(
         fmt::format("{}: format \"{}\"; this version of warpath reads \"{}\"", path.string(), format, kFormat));
   WarpFile file;
-  if (tensors.meta(kPrefix + "family") == kField) {
+  if (const std::string& family = tensors.meta(kPrefix + "family"); family == "field") {
     file.vertex_warp = Field::load(tensors, kPrefix);
+  } else if (family == "neural") {
+    const auto neural = Neural::load(tensors, kPrefix);
+    file.vertex_warp = neural;
+    file.layout = neural->numbers();
   } else {
     try {
       file.layout = Layout::parse(tensors.meta("layout"));

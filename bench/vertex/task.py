@@ -1,0 +1,13 @@
+"""Drawing at a vertex, on one thread: finding out where it is, then the three numbers of light sampling and the three of scattering."""
+from harness import Bound, Row
+
+#: Nanoseconds for the first three numbers of a vertex.
+MOST = {"field": 100, "neural": 300}
+
+
+def rows(bench):
+    results = bench.counters("vertex", "^draw/")
+    for name, most in MOST.items():
+        row = results[f"draw/{name}"]
+        first = row["locate"] + max(row["light"], row["scatter"])
+        yield Row(f"{name}, three numbers", first, "ns", Bound(most=most), f"{row['ns/vertex']:.0f} ns for six; {row['peak_GFLOP/s']:.0f} GFLOP/s peak")

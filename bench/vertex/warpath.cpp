@@ -1,0 +1,138 @@
+// Drawing the numbers of a vertex, on one thread: what the path knows there is looked up once, then come the numbers of
+// light sampling and those of scattering.
+//   bench_vertex [--benchmark_filter=...]      ns/vertex of each part
+#include <benchmark/benchmark.h>
+
+#include <ctime>
+
+#include "bench/nn/fma_peak.h"
+#include "core/floating_point.h"
+#include "core/rng.h"
+#include "core/vertex_context_buffer.h"
+#include "train/neural_trainer.h"
+
+namespace {
+using namespace warpath;
+
+constexpr std::size_t kVertices = 2048;
+
+/// Vertices on the walls of a room, as a batch of paths meets them: neighbours first, then all over.
+struct Vertices {
+  VertexContextBuffer buffer;
+  explicit Vertices(std::uint64_t seed) {
+    for (std::size_t i = 0; i < kVertices; ++i) {
+      const std::uint64_t key = sample_key(seed, i);
+      std::array<float, 13> c;
+      for (std::uint32_t k = 0; k < 3; ++k) c[k] = sample_float(key, k), c[9 + k] = 0.5f;
+      const auto side = static_cast<std::size_t>(sample_float(key, 3) * 6);
+      for (std::size_t k = 0; k < 3; ++k) c[3 + k] = 0, c[6 + k] = 0.5f;
+      c[3 + side / 2] = side % 2 ? -1.0f : 1.0f;
+      c[side / 2] = side % 2 ? 1.0f : 0.0f;
+      c[12] = 1;
+      const auto kind = static_cast<std::uint8_t>(SurfaceKind::diffuse);
+      const auto material = static_cast<std::uint32_t>(side);
+      buffer.add(c, kind, material);
+    }
+  }
+};
+
+/// What passes would teach: light from a corner.
+std::shared_ptr<const VertexWarp> teach(VertexTrainer& trainer) {
+  for (std::uint64_t pass = 0; pass < 4; ++pass) {
+    for (std::uint64_t b = 0; b < 64; ++b) {
+      const Vertices vertices(100 * pass + b);
+      std::array<std::vector<float>, kBounceDimensions> u;
+      std::vector<float> inv_q(kVertices, 1.0f), light, beyond;
+      std::vector<std::uint32_t> lanes;
+      for (std::uint32_t i = 0; i < kVertices; ++i) {
+        for (std::uint32_t d = 0; d < kBounceDimensions; ++d)
+          u[d].push_back(sample_float(sample_key(1000 + 100 * pass + b, i), d));
+        light.push_back(u[1][i] < 0.3f && u[2][i] > 0.5f ? 1.0f : 0.0f);
+        beyond.push_back(u[4][i] < 0.5f && u[5][i] < vertices.buffer.view().position[0][i] ? 1.0f : 0.1f);
+        lanes.push_back(i);
+      }
+      VertexRecords records;
+      records.bounce = 1;
+      records.lanes = lanes;
+      records.context = vertices.buffer.view();
+      for (std::size_t d = 0; d < kBounceDimensions; ++d) records.numbers[d] = u[d].data();
+      records.inv_q_light = records.inv_q_scatter = inv_q.data();
+      records.light = light.data();
+      records.beyond = beyond.data();
+      const auto recorder = trainer.make_recorder();
+      recorder->record(records);
+      trainer.merge(*recorder);
+    }
+    trainer.warp();
+  }
+  return trainer.warp();
+}
+
+std::shared_ptr<const VertexWarp> field() {
+  FieldTrainer trainer({}, 1);
+  return teach(trainer);
+}
+std::shared_ptr<const VertexWarp> neural() {
+  NeuralTrainer trainer({}, 1, 1);
+  return teach(trainer);
+}
+
+/// CPU seconds of this thread: others may be using the machine.
+double thread_seconds() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+void draw(benchmark::State& state, const std::shared_ptr<const VertexWarp>& warp) {
+  const FlushDenormals flush;
+  const Vertices vertices(7);
+  std::vector<std::uint32_t> places(kVertices * warp->place_size());
+  std::array<std::vector<double>, 3> z;
+  std::array<std::vector<float>, 3> y;
+  std::vector<float> inv_q(kVertices);
+  for (std::uint32_t a = 0; a < 3; ++a) {
+    y[a].resize(kVertices);
+    for (std::size_t i = 0; i < kVertices; ++i) z[a].push_back(sample_double(sample_key(3, i), a));
+  }
+  double locating = 0, light = 0, scatter = 0;
+  const auto context = vertices.buffer.view();
+  const auto sample = [&](VertexNumbers which) {
+    warp->sample(which, context, places.data(), kVertices, {z[0].data(), z[1].data(), z[2].data()},
+                 {y[0].data(), y[1].data(), y[2].data()}, inv_q.data());
+    benchmark::ClobberMemory();
+  };
+  for (auto _ : state) {
+    const double start = thread_seconds();
+    warp->locate(context, kVertices, places.data());
+    benchmark::ClobberMemory();
+    const double located = thread_seconds();
+    sample(VertexNumbers::light);
+    const double lit = thread_seconds();
+    sample(VertexNumbers::scatter);
+    const double scattered = thread_seconds();
+    locating += located - start, light += lit - located, scatter += scattered - lit;
+  }
+  const double over = 1e9 / static_cast<double>(state.iterations() * kVertices);
+  static const double peak = bench::fma_peak();
+  state.counters["peak_GFLOP/s"] = peak * 1e-9;
+  state.counters["ns/vertex"] = (locating + light + scatter) * over;
+  state.counters["locate"] = locating * over;
+  state.counters["light"] = light * over;
+  state.counters["scatter"] = scatter * over;
+}
+
+void draw_field(benchmark::State& state) {
+  static const auto warp = field();
+  draw(state, warp);
+}
+void draw_neural(benchmark::State& state) {
+  static const auto warp = neural();
+  draw(state, warp);
+}
+BENCHMARK(draw_field)->Name("draw/field");
+BENCHMARK(draw_neural)->Name("draw/neural");
+
+}  // namespace
+
+BENCHMARK_MAIN();
