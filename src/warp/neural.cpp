@@ -87,14 +87,28 @@ void Neural::locate(const VertexContext& context, std::size_t n, std::uint32_t* 
 
 void Neural::sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                     const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const {
-  std::array<float, 3> drawn;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Place place(places + i * kPlaceSize);
-    const std::size_t head = VertexNetwork::head_of(which, static_cast<SurfaceKind>(context.kind[i]));
-    inv_q[i] =
-        sample_nodes(m_network->tree(head), m_parameters.data() + m_network->first_of_head(head),
-                     m_field->density(which, place.cell), place.features.data(), {z[0][i], z[1][i], z[2][i]}, drawn);
-    for (std::size_t a = 0; a < 3; ++a) y[a][i] = drawn[a];
+  alignas(64) std::array<std::array<float, kNodeFeatures>, kMostDraws> features;
+  std::array<NodeDraw, kMostDraws> draws;
+  for (std::size_t first = 0; first < n; first += kMostDraws) {
+    const std::size_t count = std::min(n - first, kMostDraws);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = first + k;
+      const std::uint32_t* place = places + i * kPlaceSize;
+      std::memcpy(features[k].data(), place + 1, sizeof features[k]);
+      const std::size_t head = VertexNetwork::head_of(which, static_cast<SurfaceKind>(context.kind[i]));
+      draws[k] = {&m_network->tree(head),
+                  m_parameters.data() + m_network->first_of_head(head),
+                  m_field->density(which, place[0]),
+                  features[k].data(),
+                  {z[0][i], z[1][i], z[2][i]},
+                  {},
+                  0};
+    }
+    sample_nodes(std::span(draws).first(count));
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t a = 0; a < 3; ++a) y[a][first + k] = draws[k].y[a];
+      inv_q[first + k] = draws[k].inv_q;
+    }
   }
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "warpath/error.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "warp/node_kernels.cpp"  // compiled once for each instruction set
 #include <hwy/foreach_target.h>
@@ -81,32 +83,38 @@ struct Prior {
   }
 };
 
-/// A node: e = prior * exp(b + W h), sums of e up to and with each child, and their whole.
+/// b + W h of a node's children.
+HWY_INLINE Children Logits(const float* HWY_RESTRICT w, const float* HWY_RESTRICT h) {
+  constexpr int kChains = 4;  // to hide the latency of the additions
+  V sums[kChains][kVectors];
+  for (int k = 0; k < kVectors; ++k) {
+    sums[0][k] = hn::Load(d, w + k * kLanes);
+    for (int c = 1; c < kChains; ++c) sums[c][k] = hn::Zero(d);
+  }
+  w += kChildren;
+  HWY_UNROLL(8)
+  for (int f = 0; f < kNodeFeatures; f += kChains) {
+    HWY_UNROLL(4)
+    for (int c = 0; c < kChains; ++c, w += kChildren) {
+      const V feature = hn::Set(d, h[f + c]);
+      for (int k = 0; k < kVectors; ++k) sums[c][k] = hn::MulAdd(feature, hn::Load(d, w + k * kLanes), sums[c][k]);
+    }
+  }
+  Children logits;
+  for (int k = 0; k < kVectors; ++k)
+    logits.v[k] = hn::Add(hn::Add(sums[0][k], sums[1][k]), hn::Add(sums[2][k], sums[3][k]));
+  return logits;
+}
+
+/// e = prior * exp(logits) of a node's children, sums up to and with each, and 1 over the whole.
 struct Node {
   Children e, reached;
   float over_sum;
 
-  HWY_INLINE Node(const float* HWY_RESTRICT w, const Prior& prior, const float* HWY_RESTRICT h) {
-    constexpr int kChains = 4;  // to hide the latency of the additions
-    V sums[kChains][kVectors];
-    for (int k = 0; k < kVectors; ++k) {
-      sums[0][k] = hn::Load(d, w + k * kLanes);
-      for (int c = 1; c < kChains; ++c) sums[c][k] = hn::Zero(d);
-    }
-    w += kChildren;
-    HWY_UNROLL(8)
-    for (int f = 0; f < kNodeFeatures; f += kChains) {
-      HWY_UNROLL(4)
-      for (int c = 0; c < kChains; ++c, w += kChildren) {
-        const V feature = hn::Set(d, h[f + c]);
-        for (int k = 0; k < kVectors; ++k) sums[c][k] = hn::MulAdd(feature, hn::Load(d, w + k * kLanes), sums[c][k]);
-      }
-    }
+  HWY_INLINE Node(const Children& logits, const Prior& prior) {
     const V most = hn::Set(d, 30.0f);  // far from overflow; and no child vanishes
-    for (int k = 0; k < kVectors; ++k) {
-      const V logit = hn::Add(hn::Add(sums[0][k], sums[1][k]), hn::Add(sums[2][k], sums[3][k]));
-      e.v[k] = hn::Mul(prior.own.v[k], hn::Exp(d, hn::Max(hn::Min(logit, most), hn::Neg(most))));
-    }
+    for (int k = 0; k < kVectors; ++k)
+      e.v[k] = hn::Mul(prior.own.v[k], hn::Exp(d, hn::Max(hn::Min(logits.v[k], most), hn::Neg(most))));
     reached = PrefixSums(e);
     HWY_ALIGN float last[kLanes];
     hn::Store(reached.v[kVectors - 1], d, last);
@@ -124,42 +132,64 @@ struct Way {
   }
 };
 
-float SampleNodes(const NodeTree& tree, const float* HWY_RESTRICT weights, const CumulativeProbability* field,
-                  const float* HWY_RESTRICT h, const std::array<double, 3>& latents, std::array<float, 3>& y) {
-  const HalvingGrid& grid = tree.grid();
-  std::array<double, 3> z = latents;
+/// A draw on its way down its tree.
+struct Descent {
+  std::array<double, 3> z;
   std::array<std::uint32_t, 3> place{};
   Way way;
-  std::uint32_t node = 0;
+  std::uint32_t node = 0, child = 0;
+};
+
+/// Chooses the child of a node.
+HWY_INLINE void Choose(const NodeDraw& draw, std::uint32_t depth, const float* HWY_RESTRICT logits, Descent& on) {
   HWY_ALIGN float e[kChildren], own[kChildren], reached[kChildren];
-  for (std::uint32_t depth = 0;; ++depth) {
-    const HalvingGrid::Rank& rank = grid.rank(depth);
-    const Prior prior(tree, field, node);
-    const Node here(weights + node * NodeTree::kNodeSize, prior, h);
-    const V network = hn::Set(d, (1 - kPriorShare) * way.network * here.over_sum);
-    const V rest = hn::Set(d, kPriorShare * way.prior);
-    const float key = static_cast<float>(z[rank.driver]) * way.mass();
-    const V keys = hn::Set(d, key);
-    std::size_t passed = 0;
-    for (int k = 0; k < kVectors; ++k) {
-      const V end = hn::MulAdd(network, here.reached.v[k], hn::Mul(rest, prior.reached.v[k]));
-      hn::Store(end, d, reached + k * kLanes);
-      passed += hn::CountTrue(d, hn::Le(end, keys));
-    }
-    here.e.Store(e);
-    prior.own.Store(own);
-    auto child = static_cast<std::uint32_t>(std::min<std::size_t>(passed, kChildren - 1));
-    // Rounding may lead beyond the last child that exists, and those that do are the first ones.
-    while (!(own[child] > 0)) --child;
-    way.Descend(e[child], here.over_sum, own[child]);
-    const float mass = way.mass();
-    z[rank.driver] = std::clamp(static_cast<double>((key - (reached[child] - mass)) / mass), 0.0, 0x1.fffffep-1);
-    for (std::size_t a = 0; a < 3; ++a) place[a] += rank.place[child][a];
-    if (depth + 1 == grid.depth()) break;
-    node = grid.rank(depth + 1).first + (node - rank.first) * kChildren + child;
+  const HalvingGrid::Rank& rank = draw.tree->grid().rank(depth);
+  const Prior prior(*draw.tree, draw.prior, on.node);
+  const Node here(Children::Load(logits), prior);
+  const V network = hn::Set(d, (1 - kPriorShare) * on.way.network * here.over_sum);
+  const V rest = hn::Set(d, kPriorShare * on.way.prior);
+  double& z = on.z[rank.driver];
+  const float key = static_cast<float>(z) * on.way.mass();
+  const V keys = hn::Set(d, key);
+  std::size_t passed = 0;
+  for (int k = 0; k < kVectors; ++k) {
+    const V end = hn::MulAdd(network, here.reached.v[k], hn::Mul(rest, prior.reached.v[k]));
+    hn::Store(end, d, reached + k * kLanes);
+    passed += hn::CountTrue(d, hn::Le(end, keys));
   }
-  y = grid.point(place, z);
-  return tree.bin_volume() / way.mass();
+  here.e.Store(e);
+  prior.own.Store(own);
+  auto child = static_cast<std::uint32_t>(std::min<std::size_t>(passed, kChildren - 1));
+  // Rounding may lead beyond the last child that exists, and those that do are the first ones.
+  while (!(own[child] > 0)) --child;
+  on.child = child;
+  on.way.Descend(e[child], here.over_sum, own[child]);
+  const float mass = on.way.mass();
+  z = std::clamp(static_cast<double>((key - (reached[child] - mass)) / mass), 0.0, 0x1.fffffep-1);
+  for (std::size_t a = 0; a < 3; ++a) on.place[a] += rank.place[child][a];
+}
+
+// The logits of all draws, then all choices: one draw's chain of operations alone would leave the core waiting.
+void SampleNodes(NodeDraw* HWY_RESTRICT draws, std::size_t n) {
+  HWY_ALIGN float logits[kMostDraws][kChildren];
+  std::array<Descent, kMostDraws> on;
+  for (std::size_t i = 0; i < n; ++i) on[i].z = draws[i].z;
+  const std::uint32_t depths = n > 0 ? draws[0].tree->grid().depth() : 0;
+  for (std::uint32_t depth = 0; depth < depths; ++depth) {
+    for (std::size_t i = 0; i < n; ++i) {
+      Descent& to = on[i];
+      if (depth > 0) {
+        const HalvingGrid& grid = draws[i].tree->grid();
+        to.node = grid.rank(depth).first + (to.node - grid.rank(depth - 1).first) * kChildren + to.child;
+      }
+      Logits(draws[i].weights + to.node * NodeTree::kNodeSize, draws[i].h).Store(logits[i]);
+    }
+    for (std::size_t i = 0; i < n; ++i) Choose(draws[i], depth, logits[i], on[i]);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    draws[i].y = draws[i].tree->grid().point(on[i].place, on[i].z);
+    draws[i].inv_q = draws[i].tree->bin_volume() / on[i].way.mass();
+  }
 }
 
 float InverseNodeDensity(const NodeTree& tree, const float* HWY_RESTRICT weights, const CumulativeProbability* field,
@@ -170,7 +200,7 @@ float InverseNodeDensity(const NodeTree& tree, const float* HWY_RESTRICT weights
   for (std::uint32_t depth = 0; depth < grid.depth(); ++depth) {
     const std::uint32_t node = grid.node_above(bin, depth), child = grid.child_above(bin, depth);
     const Prior prior(tree, field, node);
-    const Node here(weights + node * NodeTree::kNodeSize, prior, h);
+    const Node here(Logits(weights + node * NodeTree::kNodeSize, h), prior);
     here.e.Store(e);
     prior.own.Store(own);
     way.Descend(e[child], here.over_sum, own[child]);
@@ -189,7 +219,7 @@ float TrainNodes(const NodeTree& tree, const float* HWY_RESTRICT weights, const 
     const std::uint32_t node = nodes[depth] = grid.node_above(bin, depth);
     const std::uint32_t child = children[depth] = grid.child_above(bin, depth);
     const Prior prior(tree, field, node);
-    const Node here(weights + node * NodeTree::kNodeSize, prior, h);
+    const Node here(Logits(weights + node * NodeTree::kNodeSize, h), prior);
     const V over_sum = hn::Set(d, here.over_sum);
     for (int k = 0; k < kVectors; ++k) hn::Store(hn::Mul(here.e.v[k], over_sum), d, p[depth] + k * kLanes);
     prior.own.Store(own);
@@ -232,9 +262,9 @@ HWY_EXPORT(SampleNodes);
 HWY_EXPORT(InverseNodeDensity);
 HWY_EXPORT(TrainNodes);
 
-float sample_nodes(const NodeTree& tree, const float* weights, const CumulativeProbability* prior, const float* h,
-                   const std::array<double, 3>& z, std::array<float, 3>& y) {
-  return HWY_DYNAMIC_DISPATCH(SampleNodes)(tree, weights, prior, h, z, y);
+void sample_nodes(std::span<NodeDraw> draws) {
+  WARPATH_CHECK(draws.size() <= kMostDraws);
+  HWY_DYNAMIC_DISPATCH(SampleNodes)(draws.data(), draws.size());
 }
 
 float inverse_node_density(const NodeTree& tree, const float* weights, const CumulativeProbability* prior,

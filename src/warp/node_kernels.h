@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "nn/simd.h"
 #include "warp/halving_density.h"
@@ -41,10 +42,19 @@ class NodeTree {
   nn::AlignedVector<float> m_shares, m_reached;
 };
 
-/// Draws from a tree. prior: the density of a field's cell, or null for that of the volume; h: kNodeFeatures, aligned;
-/// z: three latents; y: the numbers. Returns 1 / q.
-float sample_nodes(const NodeTree& tree, const float* weights, const CumulativeProbability* prior, const float* h,
-                   const std::array<double, 3>& z, std::array<float, 3>& y);
+/// A draw from a tree.
+struct NodeDraw {
+  const NodeTree* tree;
+  const float* weights;
+  const CumulativeProbability* prior;  ///< the density of a field's cell, or null for that of the volume
+  const float* h;                      ///< kNodeFeatures
+  std::array<double, 3> z;             ///< latents
+  std::array<float, 3> y;              ///< the numbers that were drawn
+  float inv_q;                         ///< 1 / q(y)
+};
+inline constexpr std::size_t kMostDraws = 16;
+/// Draws at most kMostDraws, from trees of one depth.
+void sample_nodes(std::span<NodeDraw> draws);
 /// 1 / q in a bin.
 float inverse_node_density(const NodeTree& tree, const float* weights, const CumulativeProbability* prior,
                            const float* h, std::uint32_t bin);

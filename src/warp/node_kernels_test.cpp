@@ -28,6 +28,12 @@ struct Example {
     grid.set_density(mass, cumulative.data());
   }
   const CumulativeProbability* prior() const { return cumulative.empty() ? nullptr : cumulative.data(); }
+  float draw(const std::array<double, 3>& z, std::array<float, 3>& y) const {
+    std::array draws{NodeDraw{&tree, weights.data(), prior(), features.data(), z, {}, 0}};
+    sample_nodes(draws);
+    y = draws[0].y;
+    return draws[0].inv_q;
+  }
   double density(std::uint32_t bin) const {
     return 1 / static_cast<double>(inverse_node_density(tree, weights.data(), prior(), features.data(), bin));
   }
@@ -97,8 +103,7 @@ TEST_P(NodeKernels, SamplesFollowTheDensityThatTheyAreDividedBy) {
       std::array<float, 3> y;
       for (std::size_t i = 0; i < n; ++i) {
         const std::uint64_t key = sample_key(kSeed + 100, i);
-        const float inv_q = sample_nodes(e.tree, e.weights.data(), e.prior(), e.features.data(),
-                                         {sample_double(key, 0), sample_double(key, 1), sample_double(key, 2)}, y);
+        const float inv_q = e.draw({sample_double(key, 0), sample_double(key, 1), sample_double(key, 2)}, y);
         for (const float number : y) ASSERT_TRUE(number >= 0 && number < 1);
         const std::uint32_t bin = grid.bin(y[0], y[1], y[2]);
         ASSERT_NEAR(static_cast<double>(inv_q) * e.density(bin), 1, 1e-5);
@@ -126,7 +131,7 @@ TEST_P(NodeKernels, ExtremesStayInsideTheCube) {
   std::array<float, 3> y;
   for (const double a : {0.0, 0.5, 0x1.fffffffffffffp-1})
     for (const double b : {0.0, 0.5, 0x1.fffffffffffffp-1}) {
-      const float inv_q = sample_nodes(e.tree, e.weights.data(), e.prior(), e.features.data(), {a, b, a}, y);
+      const float inv_q = e.draw({a, b, a}, y);
       EXPECT_TRUE(std::isfinite(inv_q) && inv_q > 0);
       for (const float number : y) EXPECT_TRUE(number >= 0 && number < 1);
       EXPECT_GT(grid.volume(grid.bin(y[0], y[1], y[2])), 0);
