@@ -90,17 +90,17 @@ def light_choice(label, depth, dims):
 
 
 def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
-    """Candidates for each resampled example, 1.5 to 64, on the break shot: what more of them cost and gain; the knee.
+    """Candidates for each resampled example, 1.5 to 64, on scenes/box: what more of them cost and gain; the knee.
 
     The number of examples and of training steps is the same, so only their quality differs.
     """
-    scene, film = own_scene("billiards"), {**FILM, "size": "128x72"}
-    measure = {**film, "spp": 32, "runs": 4, **render_reference("alpha", scene, 256, "field", objective="mse", **film)}
+    scene, film = own_scene("box"), {**FILM, "size": "64x48"}
+    measure = {**film, "spp": 64, "runs": 6, **render_reference("alpha", scene, 1024, "field", objective="mse", **film)}
     base = compare("alpha/baselines", scene, ["none", "uniform:film+bounce1"], **measure)
     table = ["| α | candidates | candidates, CPU s | resampling, CPU s | gain over uniform | held-out loss |", "|---|---|---|---|---|---|"]
     line, times = [], []
     for a in alphas:
-        runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, epp=1, max_steps=200)
+        runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, examples=20000, max_steps=200)
         gained, error = gain(of_method(base, "uniform:film+bounce1"), runs, "mse")
         gathering = mean(column(runs, "candidate_cpu_seconds"))
         resampling = mean([run["train_cpu_seconds"] - run["training_curve"][-1]["cpu_seconds"] for run in runs])
