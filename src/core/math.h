@@ -24,6 +24,8 @@ inline float luminance(const Color& c) { return 0.212671f * c.x + 0.715160f * c.
 inline float larger(float a, float b) { return b > a ? b : a; }
 inline float smaller(float a, float b) { return b < a ? b : a; }
 inline float max_component(const Color& c) { return larger(c.x, larger(c.y, c.z)); }
+/// v over its length, by one division; Imath's own minds vectors whose square underflows, and is slow.
+inline Vec3 unit(const Vec3& v) { return v * (1 / std::sqrt(v.dot(v))); }
 inline float sqr(float x) { return x * x; }
 inline float clamp01(float x) { return smaller(1.0f, larger(0.0f, x)); }
 

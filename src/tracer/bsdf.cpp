@@ -56,10 +56,6 @@ bool is_plain_diffuse(const Scatter& scatter) {
   return scatter.lobe_count == 1 && l.frame == 0 && scatter.models[l.model].type == LobeType::diffuse;
 }
 
-bool is_delta(LobeType t) {
-  return t == LobeType::conductor || t == LobeType::dielectric || t == LobeType::thin_dielectric || t == LobeType::null;
-}
-
 }  // namespace
 
 Color eval_pdf_bsdf(const Scatter& scatter, const Vec3& wo, float& pdf) {
@@ -120,10 +116,7 @@ BsdfSample sample_bsdf(const Scatter& scatter, float u, const Vec2& dir) {
   return result;
 }
 
-bool is_smooth(const Scatter& scatter) {
-  return std::any_of(scatter.lobes.data(), lobes_end(scatter),
-                     [&](const ScatterLobe& l) { return !is_delta(scatter.models[l.model].type); });
-}
+bool is_smooth(const Scatter& scatter) { return scatter.smooth; }
 
 Color albedo(const Scatter& scatter) {
   Color sum(0.0f);

@@ -4,6 +4,7 @@
 
 #include "tracer/sample_square_to_hemisphere.h"
 #include "tracer/sampling.h"
+#include "warpath/error.h"
 
 namespace warpath {
 
@@ -49,6 +50,28 @@ Camera::Ray Camera::ray(const Vec2& film, const Vec2& lens, float time) const {
   ray.origin = translation + to_world(on_lens, time) + ray.direction * (m_near / d.z);
   ray.t_max = (m_far - m_near) / d.z;
   return ray;
+}
+
+void Camera::pinhole_rays(std::size_t n, const float* __restrict x, const float* __restrict y,
+                          const RayStream& rays) const {
+  WARPATH_CHECK(!has_lens() && !m_moves);
+  const Matrix4 m = m_rotation;
+  const Vec3 o = m_translation[0];
+  const float tan_x = m_tan_x, tan_y = m_tan_y, principal_x = m_principal_x, principal_y = m_principal_y;
+  const float near = m_near, depth = m_far - m_near;
+  float* __restrict ox = rays.ox, * __restrict oy = rays.oy, * __restrict oz = rays.oz, * __restrict dx = rays.dx, * __restrict dy = rays.dy, * __restrict dz = rays.dz, * __restrict t_max = rays.t_max;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float px = (1 - 2 * (x[i] + principal_x)) * tan_x, py = (1 - 2 * (y[i] + principal_y)) * tan_y;
+    const float length = std::sqrt(px * px + py * py + 1), inverse = 1 / length;
+    const float lx = px * inverse, ly = py * inverse;
+    const float wx = lx * m[0][0] + ly * m[1][0] + inverse * m[2][0];
+    const float wy = lx * m[0][1] + ly * m[1][1] + inverse * m[2][1];
+    const float wz = lx * m[0][2] + ly * m[1][2] + inverse * m[2][2];
+    const float scale = 1 / std::sqrt(wx * wx + wy * wy + wz * wz), start = near * length;
+    dx[i] = wx * scale, dy[i] = wy * scale, dz[i] = wz * scale;
+    ox[i] = o.x + dx[i] * start, oy[i] = o.y + dy[i] * start, oz[i] = o.z + dz[i] * start;
+    t_max[i] = depth * length;
+  }
 }
 
 Vec3 Camera::project(const Vec3& world) const {

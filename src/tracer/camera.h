@@ -2,6 +2,7 @@
 #include <Imath/ImathQuat.h>
 
 #include "scene/scene.h"
+#include "tracer/ray_stream.h"
 
 namespace warpath {
 
@@ -19,6 +20,9 @@ class Camera {
   /// film in [0,1)^2 over the whole film, y down; lens in [0,1)^2; time in [0,1] within the shutter. The ray starts at
   /// the near clipping plane and ends at the far one.
   Ray ray(const Vec2& film, const Vec2& lens, float time) const;
+  /// The same for n film positions x, y, of a pinhole that stands still: for loops without branches. Leaves the rays'
+  /// times alone.
+  void pinhole_rays(std::size_t n, const float* x, const float* y, const RayStream& rays) const;
 
   bool has_lens() const { return m_aperture_radius > 0; }
   bool moves() const { return m_moves; }

@@ -65,8 +65,6 @@ inline float fresnel_diffuse_reflectance(float eta) {
   return 0.919317f + inv * (-3.4793f + inv * (6.75335f + inv * (-7.80989f + inv * (4.98554f - 1.36881f * inv))));
 }
 
-/// v / |v|; v must not be 0. Imath's own is slow, since it minds vectors whose square underflows.
-inline Vec3 unit(const Vec3& v) { return v * (1 / std::sqrt(v.dot(v))); }
 inline Vec3 reflect_local(const Vec3& wi) { return {-wi.x, -wi.y, wi.z}; }
 inline Vec3 reflect_about(const Vec3& wi, const Vec3& m) { return m * (2 * wi.dot(m)) - wi; }
 inline Vec3 refract_local(const Vec3& wi, const FresnelDielectric& f) {

@@ -25,6 +25,12 @@ enum class LobeType : std::uint8_t {
   null
 };
 
+/// Has it directions that light sampling can make?
+inline bool is_smooth(LobeType type) {
+  return type != LobeType::conductor && type != LobeType::dielectric && type != LobeType::thin_dielectric &&
+         type != LobeType::null;
+}
+
 struct LobeModel {
   LobeType type = LobeType::null;
   MicrofacetType distribution = MicrofacetType::beckmann;

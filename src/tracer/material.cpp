@@ -35,6 +35,7 @@ class Resolver {
     m_scatter.models = m_materials.models.data();
     m_scatter.wi = m_point.wi;
     m_scatter.lobe_count = m_scatter.value_count = m_scatter.perturbed_count = 0;
+    m_scatter.smooth = false;
     m_base_turned = behind;
     walk(root, {1, 0, false});
   }
@@ -102,6 +103,7 @@ class Resolver {
   void add_lobe(const MaterialNode& n, const Place& place) {
     new_lobe(place).model = n.model;
     const LobeModel& m = m_materials.models[n.model];
+    m_scatter.smooth |= is_smooth(m.type);
     switch (m.type) {
       case LobeType::null:
         break;

@@ -72,15 +72,25 @@ void PathLoop::start(float* film_x, float* film_y) {
   for (std::size_t i = 0; i < n; ++i) {
     film_x[i] = static_cast<float>(film.crop_x) + w.film.u0[i] * static_cast<float>(film.crop_width);
     film_y[i] = static_cast<float>(film.crop_y) + w.film.u1[i] * static_cast<float>(film.crop_height);
-    const Vec2 position(film_x[i] / static_cast<float>(film.width), film_y[i] / static_cast<float>(film.height));
-    const Vec2 lens = camera.has_lens() ? Vec2(w.lens.u0[i], w.lens.u1[i]) : Vec2(0);
-    const float time = uses_time ? w.shutter.u0[i] : 0.0f;
-    const Camera::Ray ray = camera.ray(position, lens, time);
-    w.rays.set(i, ray.origin, ray.direction, ray.t_max, time);
-    w.beta.set(i, Vec3(1));
-    w.eta[i] = 1;
-    w.straight[i] = 1;
+    w.film.u0[i] = film_x[i] / static_cast<float>(film.width);
+    w.film.u1[i] = film_y[i] / static_cast<float>(film.height);
   }
+  if (!camera.has_lens() && !camera.moves()) {
+    camera.pinhole_rays(n, w.film.u0, w.film.u1, w.rays);
+    if (uses_time)
+      std::copy_n(w.shutter.u0, n, w.rays.time);
+    else
+      std::fill_n(w.rays.time, n, 0.0f);
+  } else {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec2 lens = camera.has_lens() ? Vec2(w.lens.u0[i], w.lens.u1[i]) : Vec2(0);
+      const float time = uses_time ? w.shutter.u0[i] : 0.0f;
+      const Camera::Ray ray = camera.ray({w.film.u0[i], w.film.u1[i]}, lens, time);
+      w.rays.set(i, ray.origin, ray.direction, ray.t_max, time);
+    }
+  }
+  for (float* beta : {w.beta.x, w.beta.y, w.beta.z, w.eta}) std::fill_n(beta, n, 1.0f);
+  std::fill_n(w.straight, n, std::uint8_t{1});
   m_rays = n;
   m_scene.embree.intersect(w.rays, n, w.hits, true);
   if (m_hide_emitters) skip_emitters();
@@ -218,7 +228,7 @@ void PathLoop::sample_emitters(std::uint16_t bounce, Color* radiance, PathRecord
   if (m_scene.emitters.size() == 0) return;
   std::size_t n = 0;
   for (std::size_t j = 0; j < m_vertices; ++j) {
-    if (!is_smooth(w.scatter[j])) continue;
+    if (!w.scatter[j].smooth) continue;
     w.subset[n] = static_cast<std::uint32_t>(j);
     w.subset_lanes[n++] = w.vertex_lanes[j];
   }

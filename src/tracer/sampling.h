@@ -21,9 +21,6 @@ inline Vec2 sample_triangle(const Vec2& u) {
   return {1 - t, t * u.y};
 }
 
-/// v over its length, by one division. Not for vectors so short that their square underflows.
-inline Vec3 unit(const Vec3& v) { return v * (1 / std::sqrt(v.dot(v))); }
-
 /// Affine maps in Imath's row-vector convention.
 inline Vec3 transform_point(const Matrix4& m, const Vec3& p) {
   return {p.x * m[0][0] + p.y * m[1][0] + p.z * m[2][0] + m[3][0],

@@ -39,6 +39,7 @@ struct Scatter {
   Frame frame;              ///< around the shading normal; n is turned towards wi under a twosided BSDF
   Vec3 wi;                  ///< world
   std::uint8_t lobe_count, value_count, perturbed_count;
+  bool smooth;  ///< whether light sampling can reach any lobe
   std::array<ScatterLobe, kMaxLobes> lobes;
   std::array<float, kMaxValues> values;
   std::array<PerturbedFrame, kMaxPerturbed> perturbed;

@@ -84,9 +84,18 @@ Vec2 TextureLookup::Compiled::transform(const Vec2& uv) const {
   return {uv.x * to_u[0] + uv.y * to_u[1] + to_u[2], uv.x * to_v[0] + uv.y * to_v[1] + to_v[2]};
 }
 
+// Where a texture repeats, the part of the position behind the point says the same, and wrap_to need not divide.
+Vec2 TextureLookup::Compiled::place(const Vec2& uv) const {
+  const Vec2 p = transform(uv);
+  if (wrap != BitmapTexture::Wrap::repeat) return p;
+  return {p.x - std::floor(p.x), p.y - std::floor(p.y)};
+}
+
 int TextureLookup::Compiled::wrap_to(int i, int size) const {
   if (static_cast<unsigned>(i) < static_cast<unsigned>(size)) return i;
   if (wrap == BitmapTexture::Wrap::clamp) return i < 0 ? 0 : size - 1;
+  if (wrap == BitmapTexture::Wrap::repeat && i == size) return 0;
+  if (wrap == BitmapTexture::Wrap::repeat && i == -1) return size - 1;
   const int period = wrap == BitmapTexture::Wrap::mirror ? 2 * size : size;
   int r = i % period;
   if (r < 0) r += period;
@@ -115,11 +124,12 @@ TextureLookup::Compiled::Cell TextureLookup::Compiled::cell(const Vec2& position
 }
 
 Color TextureLookup::varying_color(const Compiled& t, const Vec2& uv) {
-  const Vec2 p = t.transform(uv);
   if (t.type == Type::checkerboard) {
+    const Vec2 p = t.transform(uv);
     const bool right = p.x - std::floor(p.x) > 0.5f, lower = p.y - std::floor(p.y) > 0.5f;
     return right == lower ? t.color0 : t.color1;
   }
+  const Vec2 p = t.place(uv);
   if (t.filter == BitmapTexture::Filter::nearest)
     return t.texel(t.wrap_to(floor_to_int(p.x * static_cast<float>(t.width)), t.width),
                    t.wrap_to(floor_to_int(p.y * static_cast<float>(t.height)), t.height));
@@ -142,7 +152,7 @@ float TextureLookup::varying_scalar(const Compiled& t, const Vec2& uv) {
 void TextureLookup::prefetch(TextureId id, const Vec2& uv) const {
   const Compiled& t = at(id);
   if (t.type != Type::bitmap) return;
-  const Vec2 p = t.transform(uv);
+  const Vec2 p = t.place(uv);
   const int x = t.wrap_to(floor_to_int(p.x * static_cast<float>(t.width) - 0.5f), t.width);
   const int y = floor_to_int(p.y * static_cast<float>(t.height) - 0.5f);
   for (const int row : {t.wrap_to(y, t.height), t.wrap_to(y + 1, t.height)}) {
@@ -154,7 +164,7 @@ void TextureLookup::prefetch(TextureId id, const Vec2& uv) const {
 Vec2 TextureLookup::gradient(TextureId id, const Vec2& uv) const {
   const Compiled& t = at(id);
   if (t.type != Type::bitmap || t.filter == BitmapTexture::Filter::nearest) return {0, 0};
-  const auto c = t.cell(t.transform(uv));
+  const auto c = t.cell(t.place(uv));
   const float f00 = luminance(t.texel(c.x0, c.y0)), f10 = luminance(t.texel(c.x1, c.y0));
   const float f01 = luminance(t.texel(c.x0, c.y1)), f11 = luminance(t.texel(c.x1, c.y1));
   const float dx = ((f10 - f00) * (1 - c.wy) + (f11 - f01) * c.wy) * static_cast<float>(t.width);

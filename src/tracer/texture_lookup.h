@@ -51,6 +51,7 @@ class TextureLookup {
     std::shared_ptr<const Image> image;
 
     Vec2 transform(const Vec2& uv) const;
+    Vec2 place(const Vec2& uv) const;  ///< on the image
     Color texel(int x, int y) const;
     int wrap_to(int i, int size) const;
     struct Cell {
