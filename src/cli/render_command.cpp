@@ -25,22 +25,23 @@ void run(const RenderCommand& command) {
   MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
                         command.render.objective(), terminal_stages(common.quiet));
   PreparedMethod prepared = trainer.prepare(method);
-  ImageEstimator estimator(*tracer, method.layout, prepared.proposal, common.seed, sampler);
+  auto estimator = std::make_unique<ImageEstimator>(*tracer, method.layout, prepared.proposal, common.seed, sampler);
   {
-    prepared.add_candidates(estimator);
+    prepared.add_candidates(*estimator);
     StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);
-    render_passes(estimator, budget, prepared.guide, progress.callback(), [] {});
+    render_passes(*estimator, budget, prepared.guide, progress.callback(), [] {});
   }
-  if (estimator.cost().samples == 0) throw Interrupted{};
+  const std::uint64_t samples = estimator->cost().samples, non_finite = estimator->non_finite();
+  const double spp = estimator->spp();
+  if (samples == 0) throw Interrupted{};
 
-  ImageFile file = image_file(estimator.develop());
-  describe(file, *tracer, method, common, estimator, clock());
+  ImageFile file = image_file(estimator->develop());
+  describe(file, *tracer, method, common, *estimator, clock());
+  estimator.reset();  // sums of a large film take more memory than anything that follows
   add_aovs(file, *tracer, aovs, common.seed);
   write_image(command.output, file);
-  if (estimator.non_finite() > 0)
-    log::warn("{} of {} samples were not finite; they count as 0", estimator.non_finite(), estimator.cost().samples);
-  log::info("{}: {} samples, {:.1f} per pixel, {:.1f} s", command.output.string(), estimator.cost().samples,
-            estimator.spp(), clock());
+  if (non_finite > 0) log::warn("{} of {} samples were not finite; they count as 0", non_finite, samples);
+  log::info("{}: {} samples, {:.1f} per pixel, {:.1f} s", command.output.string(), samples, spp, clock());
 }
 
 }  // namespace warpath

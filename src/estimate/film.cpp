@@ -92,6 +92,36 @@ void Film::add_neighbours(const Sample& a, const Sample& b, double share) {
     }
 }
 
+bool Film::develop(std::size_t pixel, int c, double& mean, double& variance) const {
+  const Sums& s = m_sums[pixel];
+  if (m_weights == Weights::sampled) {
+    if (s.w == 0) return false;
+    mean = s.wf[c] / s.w;
+    // Ratio estimator, to first order: sum of (w (f - mean))^2 over (sum of w)^2.
+    variance = (s.w2f2[c] - 2 * mean * s.w2f[c] + mean * mean * s.w2) / (s.w * s.w);
+    // The same with what a replicate sums in the place of w and w f.
+    if (!m_replicates.empty() && s.count >= kReplicates) {
+      double squares = 0;
+      for (std::size_t r = 0; r < kReplicates; ++r) {
+        const Replicate& replicate = m_replicates[pixel * kReplicates + r];
+        const double residual = replicate.wf[c] - mean * replicate.w;
+        squares += residual * residual;
+      }
+      variance = squares * kReplicates / (kReplicates - 1) / (s.w * s.w);
+    }
+  } else {
+    if (m_samples == 0) return false;
+    // Uniform film positions have density 1 over (width x height) pixels.
+    const double n = static_cast<double>(m_samples), area = static_cast<double>(m_width) * m_height;
+    const auto column = pixel % static_cast<std::size_t>(m_width), row = pixel / static_cast<std::size_t>(m_width);
+    const double scale = area / (n * m_integral_x[column] * m_integral_y[row]);
+    mean = s.wf[c] * scale;
+    variance = (s.w2f2[c] - s.wf[c] * s.wf[c] / n) * scale * scale;
+  }
+  variance = std::max(0.0, variance);
+  return true;
+}
+
 ImageEstimate Film::develop() const {
   ImageEstimate image;
   image.width = m_width;
@@ -99,41 +129,19 @@ ImageEstimate Film::develop() const {
   image.mean.resize(m_sums.size(), Color(0.0f));
   image.variance.resize(m_sums.size(), Color(0.0f));
   image.samples.resize(m_sums.size());
-  const double n = static_cast<double>(m_samples);
-  // Uniform film positions have density 1 over (width x height) pixels.
-  const double area = static_cast<double>(m_width) * m_height;
-  for (std::size_t p = 0; p < m_sums.size(); ++p) {
-    const Sums& s = m_sums[p];
-    const auto column = p % static_cast<std::size_t>(m_width), row = p / static_cast<std::size_t>(m_width);
-    image.samples[p] = static_cast<float>(s.count);
-    for (int c = 0; c < 3; ++c) {
-      double mean = 0, variance = 0;
-      if (m_weights == Weights::sampled) {
-        if (s.w == 0) continue;
-        mean = s.wf[c] / s.w;
-        // Ratio estimator, to first order: sum of (w (f - mean))^2 over (sum of w)^2.
-        variance = (s.w2f2[c] - 2 * mean * s.w2f[c] + mean * mean * s.w2) / (s.w * s.w);
-        // The same with what a replicate sums in the place of w and w f.
-        if (!m_replicates.empty() && s.count >= kReplicates) {
-          double squares = 0;
-          for (std::size_t r = 0; r < kReplicates; ++r) {
-            const Replicate& replicate = m_replicates[p * kReplicates + r];
-            const double residual = replicate.wf[c] - mean * replicate.w;
-            squares += residual * residual;
-          }
-          variance = squares * kReplicates / (kReplicates - 1) / (s.w * s.w);
-        }
-      } else {
-        if (n == 0) continue;
-        const double scale = area / (n * m_integral_x[column] * m_integral_y[row]);
-        mean = s.wf[c] * scale;
-        variance = (s.w2f2[c] - s.wf[c] * s.wf[c] / n) * scale * scale;
-      }
-      image.mean[p][c] = static_cast<float>(mean);
-      image.variance[p][c] = static_cast<float>(std::max(0.0, variance));
-    }
-  }
+  for (std::size_t p = 0; p < m_sums.size(); ++p) image.samples[p] = static_cast<float>(m_sums[p].count);
+  develop_onto(image);
   return image;
+}
+
+void Film::develop_onto(ImageEstimate& image) const {
+  double mean, variance;
+  for (std::size_t p = 0; p < m_sums.size(); ++p)
+    for (int c = 0; c < 3; ++c) {
+      if (!develop(p, c, mean, variance)) break;
+      image.mean[p][c] += static_cast<float>(mean);
+      image.variance[p][c] += static_cast<float>(variance);
+    }
 }
 
 }  // namespace warpath

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/math.h"
+#include "core/zeroed_array.h"
 #include "scene/scene.h"
 
 namespace warpath {
@@ -58,6 +59,8 @@ class Film {
   std::uint64_t samples() const { return m_samples; }
   std::uint64_t non_finite() const { return m_non_finite; }
   ImageEstimate develop() const;
+  /// Adds means and variances to those of an image of the same size, which is of independent samples.
+  void develop_onto(ImageEstimate& image) const;
 
  private:
   /// Per pixel: sums over splats with filter weight w and value f.
@@ -83,12 +86,14 @@ class Film {
     }
   };
   void place(float x, float y, float weight, Splat& splat) const;
+  /// Mean of a channel of a pixel, and its variance; false if nothing has fallen there.
+  bool develop(std::size_t pixel, int channel, double& mean, double& variance) const;
 
   int m_width, m_height;
   ReconstructionFilter m_filter;
   Weights m_weights;
   Errors m_errors;
-  std::vector<Sums> m_sums;
+  ZeroedArray<Sums> m_sums;
   std::vector<double> m_integral_x, m_integral_y;
   Splat m_splat, m_other;  // scratch
   std::uint64_t m_samples = 0, m_non_finite = 0;

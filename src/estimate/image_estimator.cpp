@@ -365,12 +365,7 @@ ImageEstimate ImageEstimator::develop_emission() const {
 
 ImageEstimate ImageEstimator::develop() const {
   ImageEstimate image = develop_rest();
-  if (!m_emission) return image;
-  const ImageEstimate emission = m_emission->develop();
-  for (std::size_t p = 0; p < image.mean.size(); ++p) {
-    image.mean[p] += emission.mean[p];
-    image.variance[p] += emission.variance[p];
-  }
+  if (m_emission) m_emission->develop_onto(image);
   return image;
 }
 

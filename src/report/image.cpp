@@ -34,16 +34,23 @@ Format format_of(const fs::path& path) {
   return Format::unknown;
 }
 
-/// Encodes in memory: a full disk is then met in write_atomically alone, which knows the system's reason.
-std::string encode(const fs::path& path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const void* data) {
+/// Encodes in memory: a full disk is then met in write_atomically alone, which knows the system's reason. rows(begin,
+/// end) gives those rows of the image, as they lie one behind the other.
+template <class Rows>
+std::string encode(const fs::path& path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const Rows& rows) {
   OIIO::Filesystem::IOVecOutput buffer;
   const auto fail = [&](const std::string& reason) {
     throw FileError(fmt::format("{}: cannot encode: {}", path.string(), reason));
   };
   const auto output = OIIO::ImageOutput::create(path.string(), &buffer);
   if (!output) fail(OIIO::geterror());
-  if (!output->open(path.string(), spec) || !output->write_image(type, data) || !output->close())
-    fail(output->geterror());
+  bool good = output->open(path.string(), spec);
+  constexpr int kRows = 64;  // a multiple of what OpenEXR compresses together
+  for (int y = 0; good && y < spec.height; y += kRows) {
+    const int end = std::min(spec.height, y + kRows);
+    good = output->write_scanlines(y, end, 0, type, rows(y, end).data());
+  }
+  if (!good || !output->close()) fail(output->geterror());
   const auto& bytes = buffer.buffer();
   return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
@@ -62,24 +69,30 @@ std::string encode_exr(const fs::path& path, const ImageFile& file) {
   for (const auto& [name, value] : file.attributes)
     std::visit([&, &name = name](const auto& v) { spec.attribute(name, v); }, value);
 
-  std::vector<float> values(pixel_count * channel_count);
-  for (std::size_t i = 0; i < pixel_count; ++i) {
-    float* pixel = values.data() + i * channel_count;
-    for (int c = 0; c < 3; ++c) pixel[c] = file.image.pixels[i][c];
-    for (std::size_t c = 0; c < file.channels.size(); ++c) pixel[3 + c] = file.channels[c].values[i];
-  }
-  return encode(path, spec, OIIO::TypeDesc::FLOAT, values.data());
+  return encode(path, spec, OIIO::TypeDesc::FLOAT, [&](int begin, int end) {
+    const std::size_t width = static_cast<std::size_t>(file.image.width);
+    std::vector<float> values;
+    values.reserve(static_cast<std::size_t>(end - begin) * width * static_cast<std::size_t>(channel_count));
+    for (std::size_t i = static_cast<std::size_t>(begin) * width; i < static_cast<std::size_t>(end) * width; ++i) {
+      for (int c = 0; c < 3; ++c) values.push_back(file.image.pixels[i][c]);
+      for (const ImageChannel& channel : file.channels) values.push_back(channel.values[i]);
+    }
+    return values;
+  });
 }
 
 std::string encode_8_bits(const fs::path& path, const ImageRgb& image, Format format) {
   OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");
   if (format == Format::jpeg) spec.attribute("Compression", "jpeg:95");
-  std::vector<unsigned char> values(image.pixels.size() * 3);
-  for (std::size_t i = 0; i < image.pixels.size(); ++i)
-    for (int c = 0; c < 3; ++c)
-      values[3 * i + c] = static_cast<unsigned char>(std::lround(255.0f * linear_to_srgb(image.pixels[i][c])));
-  return encode(path, spec, OIIO::TypeDesc::UINT8, values.data());
+  return encode(path, spec, OIIO::TypeDesc::UINT8, [&](int begin, int end) {
+    const std::size_t width = static_cast<std::size_t>(image.width);
+    std::vector<unsigned char> values;
+    for (std::size_t i = static_cast<std::size_t>(begin) * width; i < static_cast<std::size_t>(end) * width; ++i)
+      for (int c = 0; c < 3; ++c)
+        values.push_back(static_cast<unsigned char>(std::lround(255.0f * linear_to_srgb(image.pixels[i][c]))));
+    return values;
+  });
 }
 
 /// Where R, G and B (or Y three times) stand among a file's channels.
