@@ -98,7 +98,7 @@ def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
     measure = {**film, "spp": 64, "runs": 6, **render_reference("alpha", scene, 1024, "field", objective="mse", **film)}
     base = compare("alpha/baselines", scene, ["none", "uniform:film+bounce1"], **measure)
     table = ["| α | candidates | candidates, CPU s | resampling, CPU s | gain over uniform | held-out loss |", "|---|---|---|---|---|---|"]
-    line, times = [], []
+    line, loss_line, times = [], [], []
     for a in alphas:
         runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, examples=20000, max_steps=200)
         gained, error = gain(of_method(base, "uniform:film+bounce1"), runs, "mse")
@@ -106,12 +106,14 @@ def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
         resampling = mean([run["train_cpu_seconds"] - run["training_curve"][-1]["cpu_seconds"] for run in runs])
         losses = [run["training_curve"][-1]["held_out"] for run in runs]
         line.append((a, gained, error))
+        loss_line.append((a, mean(losses), standard_error(losses)))
         times.append((a, gathering + resampling))
         table.append(f"| {a:g} | {runs[0]['candidates']} | {gathering:.2f} | {resampling:.3f} | {gained:.2f} ± {error:.2f} |"
                      f" {mean(losses):.3f} ± {standard_error(losses):.3f} |")  # fmt: skip
     folder = folder_of("alpha")
     write_table(folder, table)
     line_chart(folder / "gain.svg", "α, candidates for each example", "gain in MSE over uniform", {"realnvp, 4D": line})
+    line_chart(folder / "loss.svg", "α, candidates for each example", "held-out loss, ln E[g / q]", {"realnvp, 4D": loss_line})
     line_chart(folder / "time.svg", "α, candidates for each example", "CPU seconds", {"candidates and resampling": times}, log_y=True)
 
 
