@@ -39,11 +39,17 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
     float light, scatter;                  // f / q
     float light_moment, scatter_moment;
-    float inv_q_light, inv_q_scatter;
+    float inv_q_light, inv_q_scatter;      // of the draw,
+    float inv_own_light, inv_own_scatter;  // and of the field
     FieldTree::Features at;
   };
-  Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree)
-      : m_squared(settings.target == FieldSettings::Target::second_moment), m_grids(grids), m_tree(std::move(tree)) {}
+  /// field: where draws come from another density; else null.
+  Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree,
+           std::shared_ptr<const Field> field)
+      : m_squared(settings.target == FieldSettings::Target::second_moment),
+        m_grids(grids),
+        m_tree(std::move(tree)),
+        m_field(std::move(field)) {}
 
   void record(const VertexRecords& records) override {
     const auto& u = records.numbers;
@@ -51,6 +57,17 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     const std::size_t n = records.lanes.size();
     m_cells.resize(std::max(m_cells.size(), n));
     m_tree->find_cells(records.context, n, m_cells.data());
+    const float *own_light = records.inv_q_light, *own_scatter = records.inv_q_scatter;
+    if (m_field) {
+      const auto density = [&](VertexNumbers which, std::size_t first, std::vector<float>& inv_q) {
+        inv_q.resize(std::max(inv_q.size(), n));
+        m_field->inverse_density(which, records.context, m_cells.data(), n, {u[first], u[first + 1], u[first + 2]},
+                                 inv_q.data());
+        return inv_q.data();
+      };
+      own_light = density(VertexNumbers::light, 0, m_inv_q_light);
+      own_scatter = density(VertexNumbers::scatter, 3, m_inv_q_scatter);
+    }
     for (std::size_t i = 0; i < n; ++i) {
       Entry entry;
       entry.root_key = FieldTree::root_key(records.context, i);
@@ -69,6 +86,8 @@ class FieldTrainer::Recorder final : public VertexRecorder {
           m_squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
       entry.inv_q_light = records.inv_q_light[i];
       entry.inv_q_scatter = records.inv_q_scatter[i];
+      entry.inv_own_light = own_light[i];
+      entry.inv_own_scatter = own_scatter[i];
       entries.push_back(entry);
     }
   }
@@ -79,19 +98,23 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   const bool m_squared;
   const FieldGrids& m_grids;
   const std::shared_ptr<const FieldTree> m_tree;
-  std::vector<std::uint32_t> m_cells;  // of the vertices of one bounce
+  const std::shared_ptr<const Field> m_field;
+  // Of the vertices of one bounce.
+  std::vector<std::uint32_t> m_cells;
+  std::vector<float> m_inv_q_light, m_inv_q_scatter;
 };
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
     : m_settings(settings), m_grids(light_parts) {}
 
-void FieldTrainer::Draws::add(float term, float inv_q) {
+void FieldTrainer::Draws::add(float term, float inv_q, float inv_own) {
   if (learned > 0) {
     // A draw that outshines all others would choose alone.
     const float bound = n > 0 ? static_cast<float>(kOutshines * sum / n) : 0.0f;
     const float f = std::min(term, bound);
-    // q = 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other share.
-    const float q = 1 / inv_q, beyond_1 = std::max((q - 1) / learned, -1.0f);
+    // The field's own q is 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other
+    // share.
+    const float q = 1 / inv_q, beyond_1 = std::max((1 / inv_own - 1) / learned, -1.0f);
     for (std::size_t s = 0; s < kUniform.size(); ++s) with_share[s] += f * f * q / (1 + (1 - kUniform[s]) * beyond_1);
   }
   n += 1, sum += term, square += static_cast<double>(term) * term;
@@ -102,8 +125,10 @@ void FieldTrainer::Draws::halve() {
   for (float& square_with : with_share) square_with *= 0.5f;
 }
 
-std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const {
-  return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass);
+std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder() const { return make_recorder(nullptr); }
+
+std::unique_ptr<VertexRecorder> FieldTrainer::make_recorder(std::shared_ptr<const Field> field) const {
+  return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass, std::move(field));
 }
 
 void FieldTrainer::add_root(std::uint32_t key) {
@@ -144,12 +169,12 @@ void FieldTrainer::merge(VertexRecorder& recorder) {
       Bin& bin = m_light[e.cell * light_bins + e.light_bin];
       bin.moment += e.light_moment;
       bin.draws += 1;
-      cell.light.add(e.light, e.inv_q_light);
+      cell.light.add(e.light, e.inv_q_light, e.inv_own_light);
     }
     Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
     bin.moment += e.scatter_moment;
     bin.draws += 1;
-    cell.scatter.add(e.scatter, e.inv_q_scatter);
+    cell.scatter.add(e.scatter, e.inv_q_scatter, e.inv_own_scatter);
   }
   entries.clear();
 }

@@ -20,6 +20,8 @@ class FieldTrainer final : public VertexTrainer {
   FieldTrainer(const FieldSettings& settings, int light_parts);
 
   std::unique_ptr<VertexRecorder> make_recorder() const override;
+  /// For passes that are drawn with another density than the field, which is what fit() gave last.
+  std::unique_ptr<VertexRecorder> make_recorder(std::shared_ptr<const Field> field) const;
   void merge(VertexRecorder& recorder) override;
   /// The field after all passes so far; cells that have seen many vertices are cut for the passes to come.
   std::shared_ptr<const Field> fit();
@@ -43,7 +45,7 @@ class FieldTrainer final : public VertexTrainer {
     /// What the sum of the squares of f / q would be with each share of uniform numbers; recent draws count most.
     std::array<float, kUniform.size()> with_share{};
     float learned = 0;  ///< share of the learned density in the field of this pass; 0: there is none
-    void add(float term, float inv_q);
+    void add(float term, float inv_q, float inv_own);
     void halve();
     /// How many equal samples would tell as much: a few that outshine all others tell little.
     double effective() const { return square > 0 ? sum * sum / square : 0; }

@@ -151,8 +151,8 @@ NeuralTrainer::NeuralTrainer(const NeuralSettings& settings, int light_parts, st
 NeuralTrainer::~NeuralTrainer() = default;
 
 std::unique_ptr<VertexRecorder> NeuralTrainer::make_recorder() const {
-  return std::make_unique<Recorder>(m_field_trainer.make_recorder(), m_network->grids(), m_field, m_means, m_settings,
-                                    m_level);
+  return std::make_unique<Recorder>(m_field_trainer.make_recorder(m_field), m_network->grids(), m_field, m_means,
+                                    m_settings, m_level);
 }
 
 void NeuralTrainer::merge(VertexRecorder& recorder) {
