@@ -23,16 +23,15 @@ double seconds_since(Clock::time_point then) { return std::chrono::duration<doub
 constexpr double kVertexWarpCost = 1.35;
 /// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
 constexpr int kTrialSpp = 8;
-/// The warp goes on learning after its first pass: it is given up there only if its error times cost is so much worse,
-/// and for good or bad after the pass that begins at kSecondLookSpp.
+/// The warp goes on learning after its first pass: it is given up only if its error times cost is so much worse there.
+/// A later look would not do: deviations of few samples come out too small, so the two passes must be about as long.
 constexpr double kStillLearns = 0.8;
-constexpr int kSecondLookSpp = 32;
 /// The pass that begins here is drawn uniformly and teaches nothing where costs are measured: that is what a path costs
 /// without a warp.
 constexpr int kPlainCostSpp = 2;
 
 /// How `auto` chooses between uniform numbers and the warp at vertices: error of one sample times its cost, of the last
-/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp; and once more later.
+/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp.
 class Trial {
  public:
   /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
@@ -53,8 +52,7 @@ class Trial {
     // Passes double, and the last one teaches nothing: half of all paths do.
     const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
     const double gain = m_plain_error / (error * cost);
-    const bool second = before >= kSecondLookSpp;
-    const bool pays = !(gain < (second ? 1 : kStillLearns));
+    const bool pays = !(gain < kStillLearns);
     guide.choice = fmt::format(
         "{}: error times cost is {:.2f} x less with a field at every vertex, whose paths cost {:.2f} x more",
         pays ? "field" : "plain path tracing", gain, cost);
@@ -63,7 +61,7 @@ class Trial {
       guide.warp = nullptr;
       guide.trainer = nullptr;
     }
-    guide.automatic = pays && !second;
+    guide.automatic = false;
   }
 
  private:
