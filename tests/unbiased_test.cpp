@@ -8,9 +8,9 @@
 #include <cstring>
 #include <functional>
 
-#include "render/method.h"
 #include "estimate/image_estimator.h"
 #include "integrand/path_integrand.h"
+#include "render/method.h"
 #include "train/candidates.h"
 #include "train/train.h"
 

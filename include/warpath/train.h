@@ -86,13 +86,13 @@ struct NeuralShape {
 };
 
 struct NeuralSettings : NeuralShape {
-  FieldSettings field;   ///< that it corrects
-  Layout numbers;        ///< that are warped: bounce1.lobe+bounce1.dir, ...; empty: those of every vertex
-  double rate = 5e-4;    ///< step size of Adam; falls to a tenth in the training after each pass
-  int batch = 1024;      ///< vertices in a training step
-  double visits = 0.1;   ///< vertices trained on, over those of a pass,
+  FieldSettings field;       ///< that it corrects
+  Layout numbers;            ///< that are warped: bounce1.lobe+bounce1.dir, ...; empty: those of every vertex
+  double rate = 5e-4;        ///< step size of Adam; falls to a tenth in the training after each pass
+  int batch = 1024;          ///< vertices in a training step
+  double visits = 0.1;       ///< vertices trained on, over those of a pass,
   int min_visits = 1 << 18;  ///< and at least
-  double clip = 20;      ///< what comes back counts as so many times its mean at most: in training only
+  double clip = 20;          ///< what comes back counts as so many times its mean at most: in training only
 };
 
 struct GridSettings {

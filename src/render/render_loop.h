@@ -20,7 +20,7 @@ struct Budget {
 struct Guide {
   std::optional<Objective> objective{};      ///< where samples go; else every pixel has as many
   std::shared_ptr<const VertexWarp> warp{};  ///< draws the numbers of vertices; null: they are uniform
-  std::unique_ptr<VertexTrainer> trainer{};   ///< learns the warp from each pass for the next; null: it stays
+  std::unique_ptr<VertexTrainer> trainer{};  ///< learns the warp from each pass for the next; null: it stays
   bool automatic = false;                    ///< the warp is given up if it does not pay for what it costs
   std::string choice{};                      ///< what was decided, and why
   bool keep = false;                         ///< learns from the last pass, too: the warp is wanted, not the image
