@@ -242,6 +242,16 @@ bool AreaLight::sample(const Vec3& from, const Vec2& u, float time, LightPoint& 
   return point.pdf > 0;
 }
 
+bool AreaLight::is_plain_rectangle(RectangleLights::Light& light) const {
+  if (!m_rectangle || m_moves || m_textured) return false;
+  light.edge_u = transform_vector(m_matrix, {2, 0, 0});
+  light.edge_v = transform_vector(m_matrix, {0, 2, 0});
+  light.corner = transform_point(m_matrix, {-1, -1, 0});
+  light.normal = m_normal;
+  light.inverse_area = m_inverse_area;
+  return true;
+}
+
 float AreaLight::pdf(const Vec3& from, const Vec3& to, const Vec3& ng, const Vec2& uv, std::uint32_t primitive,
                      float time) const {
   const Vec3 d = to - from;

@@ -4,6 +4,7 @@
 #include "scene/scene.h"
 #include "tracer/analytic_shape.h"
 #include "tracer/distribution.h"
+#include "tracer/light_samples.h"
 #include "tracer/material.h"
 
 namespace warpath {
@@ -26,6 +27,8 @@ class AreaLight {
 
   /// A point on the shape from u, or false if there is none that `from` could see.
   bool sample(const Vec3& from, const Vec2& u, float time, LightPoint& point) const;
+  /// If it is a rectangle at rest whose radiance is the same everywhere: sets where it is.
+  bool is_plain_rectangle(RectangleLights::Light& light) const;
   /// Density with which sample() makes the direction from `from` to the point `to` with geometric normal ng.
   float pdf(const Vec3& from, const Vec3& to, const Vec3& ng, const Vec2& uv, std::uint32_t primitive,
             float time) const;

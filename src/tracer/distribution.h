@@ -16,6 +16,8 @@ class DiscreteDistribution {
   /// Sum of the weights.
   double total() const { return m_total; }
   float probability(std::size_t i) const { return m_cdf[i + 1] - m_cdf[i]; }
+  /// The least u that picks the index.
+  float begin(std::size_t i) const { return m_cdf[i]; }
   /// u in [0,1) picks the index; `rest` is where u falls within the index's share, again uniform in [0,1).
   std::size_t sample(float u, float& rest) const;
 

@@ -58,6 +58,20 @@ Emitters::Emitters(const Scene& scene, std::span<const AnalyticShape* const> ana
       entry.color = directional.irradiance;
     }
   }
+  m_rectangles = find_rectangles();
+}
+
+std::optional<RectangleLights> Emitters::find_rectangles() const {
+  std::vector<RectangleLights::Light> lights(m_emitters.size());
+  if (lights.empty() || lights.size() > RectangleLights::kMost) return {};
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const Entry& entry = m_emitters[i];
+    if (entry.kind != Entry::Kind::area || !m_areas[entry.index].light.is_plain_rectangle(lights[i])) return {};
+    lights[i].radiance = m_areas[entry.index].constant;
+    lights[i].choice_begin = m_choice.begin(i);
+    lights[i].probability = entry.probability;
+  }
+  return RectangleLights(lights);
 }
 
 Color Emitters::area_radiance(const Area& area, const Vec2& uv) const {
@@ -123,6 +137,22 @@ bool Emitters::sample(const Vec3& from, float choice, const Vec2& uv, float time
   sample.pdf = entry.probability;
   sample.delta = true;
   return true;
+}
+
+void Emitters::sample(std::size_t n, const Vec3Array& from, const float* choice, const float* u, const float* v,
+                      const float* time, const LightSamples& samples) const {
+  if (m_rectangles) return m_rectangles->sample(n, from, choice, u, v, samples);
+  EmitterSample s;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!sample(from[k], choice ? choice[k] : 0.0f, {u[k], v[k]}, time[k], s)) {
+      samples.weight.set(k, Vec3(0));
+      continue;
+    }
+    samples.wo.set(k, s.wo);
+    samples.distance[k] = s.distance;
+    samples.pdf[k] = s.delta ? kInfinity : s.pdf;
+    samples.weight.set(k, {s.weight.x, s.weight.y, s.weight.z});
+  }
 }
 
 Color Emitters::radiance(std::int32_t id, const SurfacePoint& point) const {

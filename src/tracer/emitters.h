@@ -31,6 +31,10 @@ class Emitters {
 
   /// Light sampling: `choice` picks the emitter, uv the direction. False if nothing can arrive.
   bool sample(const Vec3& from, float choice, const Vec2& uv, float time, EmitterSample& sample) const;
+  /// The same for the vertices [0, n) of a batch; choice is null if it is not needed. May write up to Arena::kPad
+  /// entries beyond.
+  void sample(std::size_t n, const Vec3Array& from, const float* choice, const float* u, const float* v,
+              const float* time, const LightSamples& samples) const;
 
   /// Emitted radiance towards point.wi at a point on emitter `id`'s shape.
   Color radiance(std::int32_t id, const SurfacePoint& point) const;
@@ -62,6 +66,7 @@ class Emitters {
     Vec3 vector;  // position or direction
     Color color;
   };
+  std::optional<RectangleLights> find_rectangles() const;
   Color spot_intensity(const Spot& spot, const Vec3& away) const;
   Color area_radiance(const Area& area, const Vec2& uv) const;
 
@@ -72,6 +77,7 @@ class Emitters {
   std::optional<Environment> m_environment;
   float m_environment_probability = 0;
   DiscreteDistribution m_choice;
+  std::optional<RectangleLights> m_rectangles;  // if that is all there is
 };
 
 }  // namespace warpath

@@ -1,15 +1,36 @@
 #include "tracer/material.h"
 
 #include <algorithm>
+#include <optional>
+#include <vector>
 
 #include "tracer/material_compile.h"
+#include "tracer/plain_bsdf.h"
 #include "tracer/scatter.h"
 
 namespace warpath {
 
 struct Materials::Impl {
-  CompiledMaterials compiled;
+  explicit Impl(const Scene& scene) : compiled(compile_materials(scene)) {
+    for (const MaterialNode& node : compiled.nodes) plain.push_back(find_plain(node));
+  }
+  std::optional<PlainBsdf> find_plain(const MaterialNode& node) const;
+
+  const CompiledMaterials compiled;
+  std::vector<std::optional<PlainBsdf>> plain;  // one per BSDF of the scene
 };
+
+std::optional<PlainBsdf> Materials::Impl::find_plain(const MaterialNode& node) const {
+  const bool two_sided = node.type == MaterialNode::Type::two_sided;
+  if (two_sided && node.children[0] != node.children[1]) return {};
+  const MaterialNode& n = two_sided ? compiled.nodes[node.children[0]] : node;
+  if (n.type != MaterialNode::Type::lobe) return {};
+  const LobeModel& model = compiled.models[n.model];
+  if (model.type == LobeType::diffuse) return PlainBsdf{&model, n.values[0], Color(0.0f), two_sided};
+  if (model.type != LobeType::rough_plastic || !model.sample_visible || !compiled.textures.is_constant(n.values[1]))
+    return {};
+  return PlainBsdf{&model, n.values[0], compiled.textures.color(n.values[1], Vec2(0)), two_sided};
+}
 
 namespace {
 
@@ -212,7 +233,7 @@ class Resolver {
 
 }  // namespace
 
-Materials::Materials(const Scene& scene) : m_impl(std::make_unique<const Impl>(Impl{compile_materials(scene)})) {}
+Materials::Materials(const Scene& scene) : m_impl(std::make_unique<const Impl>(scene)) {}
 Materials::~Materials() = default;
 
 bool Materials::needs_tangents(BsdfId bsdf) const { return m_impl->compiled.nodes[bsdf].needs_tangents; }
@@ -226,6 +247,12 @@ void Materials::prefetch(BsdfId bsdf, const Vec2& uv) const {
   for (const TextureId image : m_impl->compiled.nodes[bsdf].images)
     if (image >= 0) m_impl->compiled.textures.prefetch(image, uv);
 }
+
+const PlainBsdf* Materials::plain(BsdfId bsdf) const {
+  const auto& plain = m_impl->plain[static_cast<std::size_t>(bsdf)];
+  return plain ? &*plain : nullptr;
+}
+bool Materials::is_constant(TextureId id) const { return m_impl->compiled.textures.is_constant(id); }
 
 Color Materials::texture(TextureId id, Vec2 uv) const { return m_impl->compiled.textures.color(id, uv); }
 

@@ -31,7 +31,8 @@ struct BsdfSample {
 };
 
 /// One BSDF at one point: nested BSDFs resolved, textures looked up, frame built. Plain data; lives for one bounce.
-struct Scatter;  // in scatter.h
+struct Scatter;    // in scatter.h
+struct PlainBsdf;  // in plain_bsdf.h
 
 /// The scene's BSDFs, compiled for rendering. Immutable, thread-safe.
 class Materials {
@@ -46,6 +47,10 @@ class Materials {
   /// Starts loading the texels that at() will read; to be called a while before it.
   void prefetch(BsdfId bsdf, const Vec2& uv) const;
   Color texture(TextureId id, Vec2 uv) const;
+  /// The BSDF as a plain one, or null if it is more than that.
+  const PlainBsdf* plain(BsdfId bsdf) const;
+  /// Whether that one's reflectance is the same everywhere.
+  bool is_constant(TextureId id) const;
 
  private:
   struct Impl;

@@ -27,6 +27,11 @@ class PathLoop {
   void skip_emitters();
   bool may_continue(std::uint32_t bounce) const;
   void resolve_hits(std::uint32_t bounce, Color* radiance, PathRecorder* recorder);
+  void group_by_material();
+  void prefetch_hits(std::size_t k, const Workspace::Group& group) const;
+  void resolve_point(std::size_t k, SurfacePoint& point);
+  void resolve_plain(const Workspace::Group& group);
+  void resolve_any(const Workspace::Group& group);
   void fill_context();
   void sample_emitters(std::uint16_t bounce, Color* radiance, PathRecorder* recorder);
   void trace_shadow_rays(std::size_t count, Color* radiance, PathRecorder* recorder);

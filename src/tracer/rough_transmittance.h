@@ -14,6 +14,7 @@ class RoughTransmittance {
   using Table = std::array<float, kNodes>;
   RoughTransmittance() = default;
   explicit RoughTransmittance(std::shared_ptr<const Table> table) : m_table(std::move(table)) {}
+  const float* nodes() const { return m_table ? m_table->data() : nullptr; }
   float operator()(float cos_theta) const {
     const float x = cos_theta * (kNodes - 1);
     const int i = x < kNodes - 2 ? static_cast<int>(x) : kNodes - 2;

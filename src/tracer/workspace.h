@@ -5,14 +5,20 @@
 #include <vector>
 
 #include "core/primary_source.h"
+#include "tracer/light_samples.h"
+#include "tracer/plain_bsdf.h"
 #include "tracer/ray_stream.h"
 #include "tracer/scatter.h"
+#include "tracer/vec3_array.h"
 
 namespace warpath {
 
 /// Memory for one batch, cut into arrays of one length. Grows, never shrinks.
 class Arena {
  public:
+  /// How many entries beyond the end of each array may be written, too.
+  static constexpr std::size_t kPad = 16;
+
   /// Starts over with arrays of at least n entries.
   void reset(std::size_t n);
   template <class T>
@@ -24,18 +30,10 @@ class Arena {
  private:
   void* next();
 
-  // Arrays of a power-of-two length would all fall into the same cache sets.
-  static constexpr std::size_t kPad = 16, kArrays = 112;
+  // With the pad, arrays of a power-of-two length do not all fall into the same cache sets.
+  static constexpr std::size_t kArrays = 144;
   std::size_t m_stride = 0, m_used = 0, m_capacity = 0;
   std::unique_ptr<float[]> m_memory;
-};
-
-struct Vec3Array {
-  float *x, *y, *z;
-  Vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
-  void set(std::size_t i, const Vec3& v) const { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
-  Color color(std::size_t i) const { return {x[i], y[i], z[i]}; }
-  std::array<const float*, 3> pointers() const { return {x, y, z}; }
 };
 
 /// Numbers of a group as they were drawn.
@@ -70,13 +68,34 @@ struct Workspace {
   RayStream rays;
   HitStream hits;
 
-  // One entry per vertex: the path vertex_lanes[i].
-  std::uint32_t* vertex_lanes;
-  Vec3Array position, ng;
-  float* time;
-  std::vector<Scatter> scatter;
+  // One entry per vertex, in the order of their paths, in which numbers are drawn.
+  std::uint32_t* vertex_lanes;  ///< its path
+  std::uint32_t* vertex_hit;    ///< the ray that met it
+  std::uint8_t *smooth, *goes_on;
   ContextArrays context;
   DrawnNumbers film, lens, shutter, light, light_uv, lobe, dir, roulette;
+  std::uint32_t* slot;  ///< its place among the smooth ones
+
+  // The same vertices in the order in which they are shaded: grouped by material. order[k] is the place of the k-th in
+  // the arrays above.
+  struct Group {
+    BsdfId bsdf;
+    const PlainBsdf* plain;  ///< null if it is more than that: such vertices have a Scatter
+    std::size_t begin, end;
+  };
+  std::vector<Group> groups;
+  std::vector<std::uint32_t> group_of;  ///< BSDF -> one more than its place in groups; 0 between bounces
+  std::uint32_t* order;
+  Vec3Array position, ng;
+  float* time;
+  PlainVertices plain;
+  float* uv[2];
+  std::vector<Scatter> scatter;
+  float* ordered_choice;  ///< numbers in this order: which light, or which lobe
+  DrawnNumbers ordered;   ///< and of a group of two
+  LightSamples samples;
+  Vec3Array value;  ///< of the BSDF towards a light; or what the throughput is multiplied with
+  float* pdf;
 
   // Subsets of the vertices: subset[i] is a vertex, subset_lanes[i] its path.
   std::uint32_t *subset, *subset_lanes;
