@@ -4,6 +4,7 @@
 #include <new>
 
 #include "cli/commands.h"
+#include "cli/library_pages.h"
 #include "cli/terminal.h"
 #include "core/interrupt.h"
 #include "core/log.h"
@@ -22,6 +23,7 @@ int fail(ExitCode code, const char* what) {
 
 int main(int argc, char** argv) {
   using namespace warpath;
+  give_back_library_pages();
   handle_interrupts();
   spdlog::set_default_logger(
       std::make_shared<spdlog::logger>("warpath", std::make_shared<spdlog::sinks::stderr_sink_mt>()));

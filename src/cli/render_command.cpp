@@ -35,9 +35,15 @@ void run(const RenderCommand& command) {
   const double spp = estimator->spp();
   if (samples == 0) throw Interrupted{};
 
-  ImageFile file = image_file(estimator->develop());
-  describe(file, *tracer, method, common, *estimator, clock());
-  estimator.reset();  // sums of a large film take more memory than anything that follows
+  ImageFile file;
+  {
+    ImageFile about;
+    describe(about, *tracer, method, common, *estimator, clock());
+    const ImageEstimate image = estimator->take();
+    estimator.reset();  // sums of a large film take more memory than anything that follows
+    file = image_file(image);
+    file.attributes = std::move(about.attributes);
+  }
   add_aovs(file, *tracer, aovs, common.seed);
   write_image(command.output, file);
   if (non_finite > 0) log::warn("{} of {} samples were not finite; they count as 0", non_finite, samples);

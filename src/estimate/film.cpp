@@ -62,11 +62,12 @@ void Film::add(float x, float y, const Color& value, float weight, std::uint32_t
       s.w += w;
       for (int c = 0; c < 3; ++c) s.wf[c] += w * f[c];
       if (m_errors == Errors::neighbours) continue;
-      s.w2 += w * w;
+      const float v = m_splat.weight(i, j);
+      s.w2 += v * v;
       for (int c = 0; c < 3; ++c) {
-        const double wf = w * f[c];
+        const float wf = v * f[c];
         s.w2f2[c] += wf * wf;
-        s.w2f[c] += w * wf;
+        s.w2f[c] += v * wf;
       }
       if (m_replicates.empty()) continue;
       Replicate& r = m_replicates[pixel * kReplicates + replicate];
@@ -83,11 +84,11 @@ void Film::add_neighbours(const Sample& a, const Sample& b, double share) {
     for (int i = std::min(m_splat.x0, m_other.x0); i <= std::max(m_splat.x1, m_other.x1); ++i) {
       const double wa = m_splat.weight(i, j), wb = m_other.weight(i, j), w = wa - wb;
       Sums& s = m_sums[static_cast<std::size_t>(j * m_width + i)];
-      s.w2 += share * w * w;
+      s.w2 += static_cast<float>(share * w * w);
       for (int c = 0; c < 3; ++c) {
         const double wf = wa * a.value[c] - wb * b.value[c];
-        s.w2f2[c] += share * wf * wf;
-        s.w2f[c] += share * w * wf;
+        s.w2f2[c] += static_cast<float>(share * wf * wf);
+        s.w2f[c] += static_cast<float>(share * w * wf);
       }
     }
 }
@@ -122,15 +123,39 @@ bool Film::develop(std::size_t pixel, int c, double& mean, double& variance) con
   return true;
 }
 
-ImageEstimate Film::develop() const {
-  ImageEstimate image;
+void Film::develop(std::size_t begin, std::size_t end, ImageEstimate& image) const {
   image.width = m_width;
   image.height = m_height;
-  image.mean.resize(m_sums.size(), Color(0.0f));
-  image.variance.resize(m_sums.size(), Color(0.0f));
-  image.samples.resize(m_sums.size());
-  for (std::size_t p = 0; p < m_sums.size(); ++p) image.samples[p] = static_cast<float>(m_sums[p].count);
-  develop_onto(image);
+  image.mean.reserve(m_sums.size());
+  image.variance.reserve(m_sums.size());
+  image.samples.reserve(m_sums.size());
+  for (std::size_t p = begin; p < end; ++p) {
+    Color mean(0.0f), variance(0.0f);
+    double m, v;
+    for (int c = 0; c < 3 && develop(p, c, m, v); ++c) {
+      mean[c] = static_cast<float>(m);
+      variance[c] = static_cast<float>(v);
+    }
+    image.mean.push_back(mean);
+    image.variance.push_back(variance);
+    image.samples.push_back(static_cast<float>(m_sums[p].count));
+  }
+}
+
+ImageEstimate Film::develop() const {
+  ImageEstimate image;
+  develop(0, m_sums.size(), image);
+  return image;
+}
+
+ImageEstimate Film::take() {
+  constexpr std::size_t kStep = 1 << 14;
+  ImageEstimate image;
+  for (std::size_t begin = 0; begin < m_sums.size(); begin += kStep) {
+    const std::size_t end = std::min(m_sums.size(), begin + kStep);
+    develop(begin, end, image);
+    m_sums.give_back(begin, end);
+  }
   return image;
 }
 

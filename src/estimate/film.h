@@ -59,19 +59,23 @@ class Film {
   std::uint64_t samples() const { return m_samples; }
   std::uint64_t non_finite() const { return m_non_finite; }
   ImageEstimate develop() const;
+  /// The same for the last time: sums go as pixels come, so that a large film and its image need not fit together.
+  ImageEstimate take();
   /// Adds means and variances to those of an image of the same size, which is of independent samples.
   void develop_onto(ImageEstimate& image) const;
 
  private:
-  /// Per pixel: sums over splats with filter weight w and value f.
-  struct Sums {
-    double wf[3]{};    // w f
-    double w = 0;      // w
-    double w2f2[3]{};  // (w f)^2
-    double w2f[3]{};   // w^2 f
-    double w2 = 0;     // w^2
-    double count = 0;  // samples inside the pixel
+  /// Per pixel: sums over splats with filter weight w and value f. One cache line. What makes up the mean is in double;
+  /// what tells its error need not be.
+  struct alignas(64) Sums {
+    double wf[3]{};           // w f
+    double w = 0;             // w
+    float w2f2[3]{};          // (w f)^2
+    float w2f[3]{};           // w^2 f
+    float w2 = 0;             // w^2
+    std::uint32_t count = 0;  // samples inside the pixel
   };
+  static_assert(sizeof(Sums) == 64);
   /// Sums over the splats of one replicate. In float: only their spread counts.
   struct Replicate {
     float wf[3]{}, w = 0;
@@ -85,6 +89,7 @@ class Film {
       return x[static_cast<std::size_t>(i - x0)] * y[static_cast<std::size_t>(j - y0)];
     }
   };
+  void develop(std::size_t begin, std::size_t end, ImageEstimate& image) const;
   void place(float x, float y, float weight, Splat& splat) const;
   /// Mean of a channel of a pixel, and its variance; false if nothing has fallen there.
   bool develop(std::size_t pixel, int channel, double& mean, double& variance) const;

@@ -341,9 +341,8 @@ void ImageEstimator::add_uniform_sample(float film_x, float film_y, const Color&
   m_uniform->add(film_x * static_cast<float>(film.crop_width), film_y * static_cast<float>(film.crop_height), radiance);
 }
 
-ImageEstimate ImageEstimator::develop_rest() const {
-  ImageEstimate image = m_film.develop();
-  if (!m_uniform) return image;
+void ImageEstimator::add_uniform_samples(ImageEstimate& image) const {
+  if (!m_uniform) return;
   // One weight for the whole image, from counts alone: weights that looked at the values would bias it.
   const ImageEstimate uniform = m_uniform->develop();
   const auto n = static_cast<double>(m_film.samples() + m_uniform->samples());
@@ -353,6 +352,11 @@ ImageEstimate ImageEstimator::develop_rest() const {
     image.variance[p] = image.variance[p] * sqr(1 - share) + uniform.variance[p] * sqr(share);
     image.samples[p] += uniform.samples[p];
   }
+}
+
+ImageEstimate ImageEstimator::develop_rest() const {
+  ImageEstimate image = m_film.develop();
+  add_uniform_samples(image);
   return image;
 }
 
@@ -365,6 +369,13 @@ ImageEstimate ImageEstimator::develop_emission() const {
 
 ImageEstimate ImageEstimator::develop() const {
   ImageEstimate image = develop_rest();
+  if (m_emission) m_emission->develop_onto(image);
+  return image;
+}
+
+ImageEstimate ImageEstimator::take() {
+  ImageEstimate image = m_film.take();
+  add_uniform_samples(image);
   if (m_emission) m_emission->develop_onto(image);
   return image;
 }

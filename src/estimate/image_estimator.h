@@ -70,6 +70,7 @@ class ImageEstimator {
   void add_uniform_sample(float film_x, float film_y, const Color& radiance);
 
   ImageEstimate develop() const;           ///< the whole image
+  ImageEstimate take();                    ///< the whole image, for the last time: see Film::take
   ImageEstimate develop_rest() const;      ///< without directly seen emission
   ImageEstimate develop_emission() const;  ///< directly seen emission alone
   double spp() const;                      ///< samples per pixel so far
@@ -81,6 +82,7 @@ class ImageEstimator {
   Sampler sampler() const { return m_sampler; }
 
  private:
+  void add_uniform_samples(ImageEstimate& image) const;
   void add_paths(int spp, const Guidance* guidance, const Progress& progress, const std::function<bool()>& stop);
 
   const Tracer& m_tracer;
