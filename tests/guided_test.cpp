@@ -27,6 +27,8 @@ const Tracer& box_tracer(int width, int height) {
     // Under a box every pixel's divisor is known beforehand, so that its estimate is unbiased for any number of
     // samples.
     scene.film.filter = {ReconstructionFilter::Type::box, 0.5f};
+    // Most vertices play roulette.
+    scene.integrator.rr_depth = 2;
     tracer = std::make_unique<const Tracer>(std::move(scene));
   }
   return *tracer;

@@ -12,6 +12,8 @@ VertexContext VertexContext::from(std::size_t count) const {
   if (roughness) rest.roughness += count;
   if (kind) rest.kind += count;
   if (material) rest.material += count;
+  if (throughput) rest.throughput += count;
+  if (survival) rest.survival += count;
   return rest;
 }
 

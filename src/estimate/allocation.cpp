@@ -95,6 +95,23 @@ std::vector<double> PixelMoments::deviations(Objective objective, const PixelMom
   return deviations;
 }
 
+std::vector<float> PixelMoments::brightness() const {
+  struct Pooled {
+    double n = 0, sum = 0;
+    Pooled& operator+=(const Pooled& o) {
+      n += o.n, sum += o.sum;
+      return *this;
+    }
+  };
+  std::vector<Pooled> pooled;
+  for (const Moments& m : m_moments) pooled.push_back({m.n, luminance(Color(m.sum[0], m.sum[1], m.sum[2]))});
+  pool(pooled, m_width, m_height);
+  std::vector<float> brightness;
+  for (const Pooled& around : pooled)
+    brightness.push_back(static_cast<float>(around.n > 0 ? around.sum / around.n : 0));
+  return brightness;
+}
+
 double PixelMoments::error(std::optional<Objective> objective, const PixelMoments& means) const {
   double sum = 0, square = 0;
   const std::vector<double> deviation = deviations(objective.value_or(Objective::relmse), means);

@@ -27,6 +27,8 @@ class PixelMoments {
   /// The error that one sample per pixel on average would have: with the best allocation for the objective, or, without
   /// one, relMSE with as many in every pixel. What relMSE divides by is taken from `means`.
   double error(std::optional<Objective> objective, const PixelMoments& means) const;
+  /// Luminance of each pixel, pooled over its neighbours; 0 where nothing was found yet.
+  std::vector<float> brightness() const;
   PixelMoments& operator+=(const PixelMoments& other);
 
  private:

@@ -39,7 +39,7 @@ struct Job {
   Latents latents, warp_latents;
   Matrix<double> y;
   std::vector<double> z, u, log_q;
-  std::vector<float> inv_q, film_x, film_y, weight;
+  std::vector<float> inv_q, film_x, film_y, weight, brightness;
   VertexSourceScratch vertices;
   std::unique_ptr<VertexRecorder> recorder;
   PathResults results;
@@ -164,6 +164,8 @@ void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& p
     begin.assign(1, 0);
     for (const std::uint32_t pixel : m_pixels) begin.push_back(begin.back() + counts[pixel]);
   }
+  std::vector<float> brightness;  // of each pixel
+  if (guidance.warp && m_passes_spp > 0) brightness = m_moments->brightness();
   const std::size_t total = m_joint ? pixels * static_cast<std::size_t>(spp) : begin.back();
   const std::size_t batches = (total + kBatch - 1) / kBatch;
   m_passes_spp += spp;
@@ -245,7 +247,10 @@ void ImageEstimator::add_paths(int spp, const Guidance* guide, const Progress& p
     if (!m_joint) place_on_film(job);
     if (guidance.learner && !job.recorder) job.recorder = guidance.learner->make_recorder();
     if (guidance.warp) {
-      VertexSource source(job.latents, *guidance.warp, job.film_x, job.film_y, job.vertices);
+      job.brightness.clear();
+      if (!brightness.empty())
+        for (const std::uint32_t pixel : job.pixels) job.brightness.push_back(brightness[pixel]);
+      VertexSource source(job.latents, *guidance.warp, job.film_x, job.film_y, job.brightness, job.vertices);
       m_tracer.trace(source, n, job.results, job.recorder.get());
     } else {
       static const Layout uniform;

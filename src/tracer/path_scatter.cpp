@@ -165,13 +165,18 @@ void PathLoop::play_roulette(std::uint16_t bounce, PathRecorder* recorder) {
   if (static_cast<int>(bounce) < m_rr_depth || m_rays == 0) return;
   if (m_needs_context)
     for (std::size_t k = 0; k < m_rays; ++k) w.subset_context.copy(k, w.context, w.subset[k]);
-  const VertexContext context = w.subset_context.view();
+  for (std::size_t k = 0; k < m_rays; ++k) {
+    const std::uint32_t lane = w.lanes[k];
+    w.survival[k] = smaller(max_component(w.beta.color(lane)) * sqr(w.eta[lane]), kMaxSurvival);
+  }
+  VertexContext context = w.subset_context.view();
+  context.survival = w.survival;
   const bool weigh = draw({GroupKind::rr, bounce}, {w.lanes, m_rays}, m_needs_context ? &context : nullptr, w.roulette);
   std::size_t kept = 0;
   for (std::size_t k = 0; k < m_rays; ++k) {
     const std::uint32_t lane = w.lanes[k];
     const Color beta = w.beta.color(lane);
-    const float survival = smaller(max_component(beta) * sqr(w.eta[lane]), kMaxSurvival);
+    const float survival = w.survival[k];
     const bool survives = w.roulette.u0[k] < survival;
     const float inv_q = weigh ? w.roulette.inv_q[k] : 1.0f;
     if (recorder) {

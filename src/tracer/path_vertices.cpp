@@ -181,6 +181,8 @@ void PathLoop::fill_context() {
         c.kind[j] = static_cast<std::uint8_t>(kind(scatter));
       }
       c.albedo.set(j, {a.x, a.y, a.z});
+      const std::uint32_t lane = w.vertex_lanes[j];
+      c.throughput[j] = luminance(w.beta.color(lane)) * w.weight[lane];
     }
   }
 }

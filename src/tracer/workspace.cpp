@@ -18,7 +18,8 @@ void* Arena::next() {
 }
 
 VertexContext ContextArrays::view() const {
-  return {position.pointers(), normal.pointers(), wi.pointers(), albedo.pointers(), roughness, kind, material};
+  return {position.pointers(), normal.pointers(), wi.pointers(), albedo.pointers(), roughness, kind, material,
+          throughput};
 }
 
 void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_t from) const {
@@ -29,6 +30,7 @@ void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_
   roughness[to] = source.roughness[from];
   kind[to] = source.kind[from];
   material[to] = source.material[from];
+  throughput[to] = source.throughput[from];
 }
 
 void Workspace::resize(std::size_t n) {
@@ -42,7 +44,7 @@ void Workspace::resize(std::size_t n) {
   };
   const auto numbers = [&] { return DrawnNumbers{floats(), floats(), floats()}; };
   const auto contexts = [&] {
-    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices()};
+    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices(), floats()};
   };
   beta = vectors();
   weight = floats();
@@ -68,6 +70,7 @@ void Workspace::resize(std::size_t n) {
   context = contexts();
   film = numbers(), lens = numbers(), shutter = numbers();
   light = numbers(), light_uv = numbers(), lobe = numbers(), dir = numbers(), roulette = numbers();
+  survival = floats();
   subset = indices();
   subset_lanes = indices();
   subset_context = contexts();

@@ -47,6 +47,7 @@ struct ContextArrays {
   float* roughness;
   std::uint8_t* kind;
   std::uint32_t* material;
+  float* throughput;
   VertexContext view() const;
   void copy(std::size_t to, const ContextArrays& source, std::size_t from) const;
 };
@@ -74,6 +75,7 @@ struct Workspace {
   std::uint8_t *smooth, *goes_on;
   ContextArrays context;
   DrawnNumbers film, lens, shutter, light, light_uv, lobe, dir, roulette;
+  float* survival;  ///< probability with which the renderer's roulette lets a ray go on
   std::uint32_t* slot;  ///< its place among the smooth ones
 
   // The same vertices in the order in which they are shaded: grouped by material. order[k] is the place of the k-th in

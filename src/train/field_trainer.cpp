@@ -332,8 +332,13 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
                 best_uniform(cell.scatter, pooled_scatter[kind]), cell.scatter, scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;
-  for (const Cell& cell : m_cells) kinds.push_back(cell.kind);
-  return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter));
+  std::vector<Field::Return> returns;
+  for (const Cell& cell : m_cells) {
+    kinds.push_back(cell.kind);
+    returns.push_back({static_cast<float>(cell.scatter.mean()), cell.scatter.learned});
+  }
+  return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter),
+                                 std::move(returns));
 }
 
 }  // namespace warpath

@@ -28,8 +28,7 @@ class FieldTrainer final : public VertexTrainer {
   std::shared_ptr<const VertexWarp> warp() override { return fit(); }
   /// Mean of what came back to the vertices of a cell of the last field.
   double mean(VertexNumbers which, std::uint32_t cell) const {
-    const Draws& draws = which == VertexNumbers::light ? m_cells[cell].light : m_cells[cell].scatter;
-    return draws.n > 0 ? draws.sum / draws.n : 0;
+    return (which == VertexNumbers::light ? m_cells[cell].light : m_cells[cell].scatter).mean();
   }
 
  private:
@@ -47,6 +46,7 @@ class FieldTrainer final : public VertexTrainer {
     float learned = 0;  ///< share of the learned density in the field of this pass; 0: there is none
     void add(float term, float inv_q, float inv_own);
     void halve();
+    double mean() const { return n > 0 ? sum / n : 0; }
     /// How many equal samples would tell as much: a few that outshine all others tell little.
     double effective() const { return square > 0 ? sum * sum / square : 0; }
   };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "core/rng.h"
 #include "core/tensor_file.h"
@@ -35,13 +36,15 @@ FieldGrids::FieldGrids(int parts)
       delta({4, 2, 2}) {}
 
 Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-             std::vector<CumulativeProbability> scatter)
+             std::vector<CumulativeProbability> scatter, std::vector<Return> returns)
     : m_tree(std::move(tree)),
       m_grids(std::move(grids)),
       m_kinds(std::move(kinds)),
       m_light(std::move(light)),
-      m_scatter(std::move(scatter)) {
+      m_scatter(std::move(scatter)),
+      m_returns(std::move(returns)) {
   WARPATH_CHECK_EQ(m_kinds.size(), m_tree.cells());
+  WARPATH_CHECK_EQ(m_returns.size(), m_tree.cells());
   WARPATH_CHECK_EQ(m_light.size(), m_tree.cells() * m_grids.light.stored());
   WARPATH_CHECK_EQ(m_scatter.size(), m_tree.cells() * m_grids.diffuse.stored());
 }
@@ -98,6 +101,18 @@ void Field::inverse_density(VertexNumbers which, const VertexContext&, const std
   }
 }
 
+bool Field::expect_return(const std::uint32_t* places, std::size_t n, const float* inv_q, float* expected) const {
+  for (std::size_t i = 0; i < n; ++i) {
+    expected[i] = HUGE_VALF;
+    if (places[i] == FieldTree::kNoCell) continue;
+    const Return& cell = m_returns[places[i]];
+    // The mean is of f, and f lies like the learned p, of which q = 1 + learned (p - 1): so f / q = mean p / q.
+    const float p_over_q = cell.learned > 0 ? inv_q[i] + (1 - inv_q[i]) / cell.learned : inv_q[i];
+    expected[i] = cell.mean * std::max(p_over_q, 0.0f);
+  }
+  return true;
+}
+
 void Field::save(TensorFile& file, const std::string& prefix) const {
   file.metadata()[prefix + "family"] = family();
   file.metadata()[prefix + "light_parts"] = std::to_string(m_grids.light_parts);
@@ -117,6 +132,9 @@ void Field::save(TensorFile& file, const std::string& prefix) const {
   };
   put("light", m_light, m_grids.light.stored());
   put("scatter", m_scatter, m_grids.diffuse.stored());
+  std::vector<float> returns;
+  for (const Return& cell : m_returns) returns.insert(returns.end(), {cell.mean, cell.learned});
+  file.put<float>(prefix + "returns", {cells, 2}, returns);
 }
 
 std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::string& prefix) {
@@ -151,8 +169,18 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
     if (!is_density(grids.light, light) || !is_density(grids.grid(VertexNumbers::scatter, kinds[c]), scatter))
       fail_load(file, prefix, "the probabilities of a cell do not add up");
   }
+  const std::vector<float> stored = file.get<float>(prefix + "returns").values;
+  if (stored.size() != 2 * kinds.size())
+    fail_load(file, prefix, "its cells and what returns to them do not fit each other");
+  std::vector<Return> returns;
+  for (std::size_t c = 0; c < kinds.size(); ++c) {
+    const Return cell{stored[2 * c], stored[2 * c + 1]};
+    if (!(std::isfinite(cell.mean) && cell.mean >= 0 && cell.learned >= 0 && cell.learned <= 1))
+      fail_load(file, prefix, "what returns to a cell is not a sensible number");
+    returns.push_back(cell);
+  }
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
-                                 std::move(scatter));
+                                 std::move(scatter), std::move(returns));
 }
 
 }  // namespace warpath

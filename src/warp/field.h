@@ -26,9 +26,14 @@ struct FieldGrids {
 /// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers.
 class Field final : public VertexWarp {
  public:
+  /// What comes back through the direction that is scattered into at a vertex of a cell.
+  struct Return {
+    float mean = 0;     ///< luminance over the throughput at the vertex
+    float learned = 0;  ///< share of the learned density in that of the scattering; the rest is uniform
+  };
   /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers.
   Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-        std::vector<CumulativeProbability> scatter);
+        std::vector<CumulativeProbability> scatter, std::vector<Return> returns);
 
   std::string family() const override { return "field"; }
   /// A place is a cell.
@@ -37,6 +42,7 @@ class Field final : public VertexWarp {
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override;
   void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                        const std::array<const float*, 3>& y, float* inv_q) const override;
+  bool expect_return(const std::uint32_t* places, std::size_t n, const float* inv_q, float* expected) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
   /// Throws FileError.
   static std::shared_ptr<const Field> load(const TensorFile& file, const std::string& prefix);
@@ -52,6 +58,7 @@ class Field final : public VertexWarp {
   FieldGrids m_grids;
   std::vector<SurfaceKind> m_kinds;  // of each cell
   std::vector<CumulativeProbability> m_light, m_scatter;
+  std::vector<Return> m_returns;
 };
 
 }  // namespace warpath

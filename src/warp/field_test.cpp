@@ -44,6 +44,7 @@ struct Vertices {
 };
 
 constexpr std::size_t kVertices = 3000;
+constexpr float kMeanReturn = 3;
 
 /// A field with a cut tree for the first two materials, and random densities.
 Field example(const Vertices& vertices, int light_parts) {
@@ -63,7 +64,10 @@ Field example(const Vertices& vertices, int light_parts) {
   const FieldGrids grids(light_parts);
   std::vector<CumulativeProbability> light(tree.cells() * grids.light.stored());
   std::vector<CumulativeProbability> scatter(tree.cells() * grids.diffuse.stored());
+  std::vector<Field::Return> returns;
   for (std::uint32_t c = 0; c < tree.cells(); ++c) {
+    // The least density is a sixth.
+    returns.push_back({kMeanReturn, 0.85f});
     const auto fill = [&](const HalvingGrid& grid, std::vector<CumulativeProbability>& densities) {
       std::vector<float> mass(grid.bins());
       for (std::uint32_t b = 0; b < grid.bins(); ++b)
@@ -73,7 +77,7 @@ Field example(const Vertices& vertices, int light_parts) {
     fill(grids.light, light);
     fill(grids.grid(VertexNumbers::scatter, kinds[c]), scatter);
   }
-  return Field(std::move(tree), grids, std::move(kinds), std::move(light), std::move(scatter));
+  return Field(std::move(tree), grids, std::move(kinds), std::move(light), std::move(scatter), std::move(returns));
 }
 
 struct Drawn {
@@ -121,6 +125,33 @@ TEST(Field, SamplesAndDensitiesAgree) {
   }
 }
 
+/// What a field expects back for numbers that it has drawn.
+std::vector<float> expected_returns(const Field& field, const Vertices& vertices, const Drawn& drawn) {
+  std::vector<std::uint32_t> places(kVertices);
+  field.locate(vertices.view(), kVertices, places.data());
+  std::vector<float> expected(kVertices);
+  EXPECT_TRUE(field.expect_return(places.data(), kVertices, drawn.inv_q.data(), expected.data()));
+  return expected;
+}
+
+TEST(Field, WhatIsExpectedBackIsTheMeanOfTheCellOnAverage) {
+  const Vertices vertices(kVertices);
+  const Field field = example(vertices, 3);
+  const auto expected = expected_returns(field, vertices, draw(field, VertexNumbers::scatter, vertices));
+  double n = 0, sum = 0, square = 0;
+  for (std::size_t i = 0; i < kVertices; ++i) {
+    if (vertices.material[i] == 2) {
+      EXPECT_EQ(expected[i], HUGE_VALF);
+      continue;
+    }
+    n += 1, sum += expected[i], square += expected[i] * expected[i];
+  }
+  const double mean = sum / n, variance = square / n - mean * mean;
+  EXPECT_GT(variance, 0.001 * mean * mean);
+  // 4.5 standard errors: one false alarm in 147,000 choices of seeds.
+  EXPECT_NEAR(mean, kMeanReturn, 4.5 * std::sqrt(variance / n));
+}
+
 TEST(Field, IsTheSameAfterSavingAndLoading) {
   const Vertices vertices(kVertices);
   const Field field = example(vertices, 5);
@@ -131,6 +162,9 @@ TEST(Field, IsTheSameAfterSavingAndLoading) {
     const Drawn a = draw(field, which, vertices), b = draw(*loaded, which, vertices);
     EXPECT_EQ(a.y, b.y);
     EXPECT_EQ(a.inv_q, b.inv_q);
+    if (which == VertexNumbers::scatter) {
+      EXPECT_EQ(expected_returns(field, vertices, a), expected_returns(*loaded, vertices, b));
+    }
   }
 }
 
@@ -153,6 +187,15 @@ TEST(Field, BrokenFilesAreErrors) {
     auto light = file.get<std::int32_t>("light");
     light.values[7] = kWholeProbability + 1;
     file.put<std::int32_t>("light", light.shape, light.values);
+  });
+  broken([](TensorFile& file) {
+    auto returns = file.get<float>("returns");
+    returns.values[3] = -1;
+    file.put<float>("returns", returns.shape, returns.values);
+  });
+  broken([](TensorFile& file) {
+    const std::vector<float> few(4);
+    file.put<float>("returns", {2, 2}, few);
   });
   broken([](TensorFile& file) {
     const std::vector<std::uint8_t> few(3);

@@ -124,6 +124,12 @@ void Neural::inverse_density(VertexNumbers which, const VertexContext& context, 
   }
 }
 
+bool Neural::expect_return(const std::uint32_t* places, std::size_t n, const float* inv_q, float* expected) const {
+  const Scratch<std::uint32_t> cells(n);
+  for (std::size_t i = 0; i < n; ++i) cells[i] = places[i * kPlaceSize];
+  return m_field->expect_return(cells.data(), n, inv_q, expected);
+}
+
 void Neural::save(TensorFile& file, const std::string& prefix) const {
   m_field->save(file, prefix + "field.");
   auto& meta = file.metadata();

@@ -34,6 +34,7 @@ class Neural final : public VertexWarp {
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override;
   void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                        const std::array<const float*, 3>& y, float* inv_q) const override;
+  bool expect_return(const std::uint32_t* places, std::size_t n, const float* inv_q, float* expected) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
   /// Throws FileError.
   static std::shared_ptr<const Neural> load(const TensorFile& file, const std::string& prefix);

@@ -44,6 +44,7 @@ Neural example(int light_parts, const Layout& numbers = {}) {
   const FieldGrids grids(light_parts);
   std::vector<CumulativeProbability> light(tree.cells() * grids.light.stored());
   std::vector<CumulativeProbability> scatter(tree.cells() * grids.diffuse.stored());
+  std::vector<Field::Return> returns(tree.cells());
   for (std::uint32_t c = 0; c < tree.cells(); ++c) {
     const auto fill = [&](const HalvingGrid& grid, std::vector<CumulativeProbability>& densities) {
       std::vector<float> mass(grid.bins());
@@ -54,7 +55,8 @@ Neural example(int light_parts, const Layout& numbers = {}) {
     fill(grids.light, light);
     fill(grids.grid(VertexNumbers::scatter, kinds[c]), scatter);
   }
-  auto field = std::make_shared<Field>(std::move(tree), grids, std::move(kinds), std::move(light), std::move(scatter));
+  auto field = std::make_shared<Field>(std::move(tree), grids, std::move(kinds), std::move(light), std::move(scatter),
+                                       std::move(returns));
   auto network = std::make_shared<const VertexNetwork>(light_parts, NeuralShape{});
   auto parameters = network->initial(3);
   for (std::size_t i = network->first_of_head(0); i < parameters.size(); ++i)

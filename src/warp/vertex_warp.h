@@ -33,6 +33,13 @@ class VertexWarp {
   /// inv_q[i] = 1 / q(y[i] | context[i]).
   virtual void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places,
                                std::size_t n, const std::array<const float*, 3>& y, float* inv_q) const = 0;
+  /// What comes back on average through the direction that was scattered into at n vertices, as luminance over the
+  /// throughput at the vertex; infinite where nothing is known. inv_q: of the numbers that were drawn. A guess, which
+  /// only roulette goes by. Returns false if the warp cannot tell anywhere.
+  virtual bool expect_return(const std::uint32_t* /*places*/, std::size_t /*n*/, const float* /*inv_q*/,
+                             float* /*expected*/) const {
+    return false;
+  }
   /// Puts tensors and metadata under names that start with `prefix`.
   virtual void save(TensorFile& file, const std::string& prefix) const = 0;
 };
