@@ -9,6 +9,7 @@
 #include "train/field_trainer.h"
 #include "train/neural_trainer.h"
 #include "train/train.h"
+#include "warp/field.h"
 #include "warpath/error.h"
 #include "warpath/warp_file.h"
 
@@ -151,11 +152,21 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     NeuralSettings settings = m_settings.neural;
     settings.field = m_settings.field;
     settings.numbers = method.layout;
+    if (!m_init.empty())
+      throw ConfigError(fmt::format("--init {}: neural starts anew; field can start from a field", m_init.string()));
     prepared.guide.trainer = std::make_unique<NeuralTrainer>(settings, m_tracer->emitters(), m_settings.seed);
     return prepared;
   }
   if (method.family == "field" || method.family == "auto") {
-    prepared.guide.trainer = std::make_unique<FieldTrainer>(m_settings.field, m_tracer->emitters());
+    auto trainer = std::make_unique<FieldTrainer>(m_settings.field, m_tracer->emitters());
+    if (!m_init.empty()) {
+      const auto field = std::dynamic_pointer_cast<const Field>(load_warp(m_init).vertex_warp);
+      if (!field)
+        throw ConfigError(fmt::format("--init {}: not a field, which {} starts from", m_init.string(), method.family));
+      trainer->start_from(*field);
+      prepared.guide.warp = field;
+    }
+    prepared.guide.trainer = std::move(trainer);
     prepared.guide.automatic = method.family == "auto";
     return prepared;
   }

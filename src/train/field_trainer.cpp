@@ -1,5 +1,6 @@
 #include "train/field_trainer.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -25,6 +26,9 @@ constexpr double kLikeOthers = 64;
 /// this: the positive part of the estimator of James and Stein [JS61], with a bound that chance passes in 1 of 20
 /// nodes.
 constexpr double kByChance = 4;
+
+/// Effective samples of a cell over all of them, where a field does not tell: a typical share.
+constexpr double kEffective = 0.1;
 
 /// Whether what is scattered depends on where the path came from.
 bool follows_direction(SurfaceKind kind) { return kind != SurfaceKind::diffuse && kind != SurfaceKind::null; }
@@ -106,6 +110,39 @@ class FieldTrainer::Recorder final : public VertexRecorder {
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
     : m_settings(settings), m_grids(light_parts) {}
+
+void FieldTrainer::start_from(const Field& field) {
+  if (field.grids().light_parts != m_grids.light_parts)
+    throw ConfigError(fmt::format("a field for {} equally likely lights, but there are {}: it is of another scene",
+                                  field.grids().light_parts, m_grids.light_parts));
+  m_tree = field.tree();
+  m_tree_of_pass = std::make_shared<const FieldTree>(m_tree);
+  m_cells.assign(m_tree.cells(), {});
+  m_light.assign(m_tree.cells() * m_grids.light.bins(), {});
+  m_scatter.assign(m_tree.cells() * m_grids.diffuse.bins(), {});
+  for (std::uint32_t c = 0; c < m_tree.cells(); ++c) {
+    Cell& cell = m_cells[c];
+    cell.kind = field.kind(c);
+    const auto take = [&](VertexNumbers which, Draws& draws, std::span<Bin> bins) {
+      const auto& [mean, learned] = field.returns(which, c);
+      draws.learned = learned;
+      if (!(learned > 0)) return;
+      draws.n = m_settings.split_at;
+      draws.sum = mean * draws.n;
+      draws.square = draws.sum * draws.sum / (draws.n * kEffective);
+      const HalvingGrid& grid = m_grids.grid(which, cell.kind);
+      for (std::uint32_t b = 0; b < grid.bins(); ++b) {
+        if (!(grid.volume(b) > 0)) continue;
+        const float q = 1 / grid.inverse_density(field.density(which, c), b);
+        const auto drawn = static_cast<float>(draws.n) * grid.volume(b);
+        bins[b] = {mean * std::max(1 + (q - 1) / learned, 0.0f) * drawn, q * drawn};
+      }
+    };
+    take(VertexNumbers::light, cell.light, std::span(m_light).subspan(c * m_grids.light.bins(), m_grids.light.bins()));
+    take(VertexNumbers::scatter, cell.scatter,
+         std::span(m_scatter).subspan(c * m_grids.diffuse.bins(), m_grids.diffuse.bins()));
+  }
+}
 
 void FieldTrainer::Draws::add(float term, float inv_q, float inv_own) {
   if (learned > 0) {
@@ -332,10 +369,11 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
                 best_uniform(cell.scatter, pooled_scatter[kind]), cell.scatter, scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;
-  std::vector<Field::Return> returns;
+  std::vector<Field::Returns> returns;
   for (const Cell& cell : m_cells) {
     kinds.push_back(cell.kind);
-    returns.push_back({static_cast<float>(cell.scatter.mean()), cell.scatter.learned});
+    const auto told = [](const Draws& draws) { return Field::Return{static_cast<float>(draws.mean()), draws.learned}; };
+    returns.push_back({told(cell.light), told(cell.scatter)});
   }
   return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter),
                                  std::move(returns));

@@ -19,6 +19,9 @@ class FieldTrainer final : public VertexTrainer {
   /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
   FieldTrainer(const FieldSettings& settings, int light_parts);
 
+  /// Goes on from a field of the same scene, seen from wherever, as if each of its cells had just seen as many vertices
+  /// as it takes to cut it. Before the first vertex. Throws ConfigError if it cannot be of this scene.
+  void start_from(const Field& field);
   std::unique_ptr<VertexRecorder> make_recorder() const override;
   /// For passes that are drawn with another density than the field, which is what fit() gave last.
   std::unique_ptr<VertexRecorder> make_recorder(std::shared_ptr<const Field> field) const;

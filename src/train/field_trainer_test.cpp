@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/rng.h"
+#include "warpath/error.h"
 
 namespace warpath {
 namespace {
@@ -188,6 +189,42 @@ TEST(FieldTrainer, ValuesThatAreNotFiniteTeachNothing) {
   const auto field = trainer.fit();
   for (const auto which : {VertexNumbers::light, VertexNumbers::scatter})
     EXPECT_FLOAT_EQ(density(*field, which, batch, 0, {0.1f, 0.2f, 0.3f}), 1);
+}
+
+TEST(FieldTrainer, GoesOnFromAFieldAsIfItHadTaughtItself) {
+  FieldSettings settings;
+  settings.uniform = 0.1;
+  const auto field = taught(settings, 100);
+  const Batch batch(1, 200);
+  const auto differ = [&](const Field& other) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 200; ++i)
+      for (const auto which : {VertexNumbers::light, VertexNumbers::scatter}) {
+        const std::array<float, 3> y{0.5f, sample_float(i, 1), sample_float(i, 2)};
+        const float q = density(*field, which, batch, i, y), p = density(other, which, batch, i, y);
+        sum += std::fabs(p - q) / std::max(p, q) / 400;
+      }
+    return sum;
+  };
+  FieldTrainer trainer(settings, 1);
+  trainer.start_from(*field);
+  // What few samples say is drawn to its surroundings a second time.
+  EXPECT_LT(differ(*trainer.fit()), 0.1);
+  EXPECT_GT(differ(*taught(settings, 1)), 0.2);
+  // Learning goes on: light from elsewhere now.
+  for (std::uint64_t b = 0; b < 100; ++b) {
+    Batch other(1000 + b, kBatch);
+    for (std::size_t k = 0; k < kBatch; ++k) other.beyond[k] = other.numbers[4][k] > 0.5f ? 10.0f : 0.0f;
+    teach(trainer, other);
+  }
+  const auto changed = trainer.fit();
+  EXPECT_GT(density(*changed, VertexNumbers::scatter, batch, 0, {0.5f, 0.9f, 0.5f}),
+            2 * density(*changed, VertexNumbers::scatter, batch, 0, {0.5f, 0.1f, 0.5f}));
+}
+
+TEST(FieldTrainer, AFieldOfAnotherSceneIsAnError) {
+  FieldTrainer trainer({}, 3);
+  EXPECT_THROW(trainer.start_from(*taught({}, 1)), ConfigError);
 }
 
 TEST(FieldTrainer, NumberOfCellsIsBounded) {

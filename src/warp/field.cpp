@@ -36,7 +36,7 @@ FieldGrids::FieldGrids(int parts)
       delta({4, 2, 2}) {}
 
 Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-             std::vector<CumulativeProbability> scatter, std::vector<Return> returns)
+             std::vector<CumulativeProbability> scatter, std::vector<Returns> returns)
     : m_tree(std::move(tree)),
       m_grids(std::move(grids)),
       m_kinds(std::move(kinds)),
@@ -105,7 +105,7 @@ bool Field::expect_return(const std::uint32_t* places, std::size_t n, const floa
   for (std::size_t i = 0; i < n; ++i) {
     expected[i] = HUGE_VALF;
     if (places[i] == FieldTree::kNoCell) continue;
-    const Return& cell = m_returns[places[i]];
+    const Return& cell = m_returns[places[i]].scatter;
     // The mean is of f, and f lies like the learned p, of which q = 1 + learned (p - 1): so f / q = mean p / q.
     const float p_over_q = cell.learned > 0 ? inv_q[i] + (1 - inv_q[i]) / cell.learned : inv_q[i];
     expected[i] = cell.mean * std::max(p_over_q, 0.0f);
@@ -133,8 +133,9 @@ void Field::save(TensorFile& file, const std::string& prefix) const {
   put("light", m_light, m_grids.light.stored());
   put("scatter", m_scatter, m_grids.diffuse.stored());
   std::vector<float> returns;
-  for (const Return& cell : m_returns) returns.insert(returns.end(), {cell.mean, cell.learned});
-  file.put<float>(prefix + "returns", {cells, 2}, returns);
+  for (const auto& [light, scatter] : m_returns)
+    returns.insert(returns.end(), {light.mean, light.learned, scatter.mean, scatter.learned});
+  file.put<float>(prefix + "returns", {cells, 4}, returns);
 }
 
 std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::string& prefix) {
@@ -170,14 +171,15 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
       fail_load(file, prefix, "the probabilities of a cell do not add up");
   }
   const std::vector<float> stored = file.get<float>(prefix + "returns").values;
-  if (stored.size() != 2 * kinds.size())
+  if (stored.size() != 4 * kinds.size())
     fail_load(file, prefix, "its cells and what returns to them do not fit each other");
-  std::vector<Return> returns;
+  std::vector<Returns> returns;
   for (std::size_t c = 0; c < kinds.size(); ++c) {
-    const Return cell{stored[2 * c], stored[2 * c + 1]};
-    if (!(std::isfinite(cell.mean) && cell.mean >= 0 && cell.learned >= 0 && cell.learned <= 1))
-      fail_load(file, prefix, "what returns to a cell is not a sensible number");
-    returns.push_back(cell);
+    const float* r = &stored[4 * c];
+    returns.push_back({{r[0], r[1]}, {r[2], r[3]}});
+    for (const Return& of : {returns.back().light, returns.back().scatter})
+      if (!(std::isfinite(of.mean) && of.mean >= 0 && of.learned >= 0 && of.learned <= 1))
+        fail_load(file, prefix, "what returns to a cell is not a sensible number");
   }
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
                                  std::move(scatter), std::move(returns));

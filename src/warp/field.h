@@ -26,14 +26,17 @@ struct FieldGrids {
 /// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers.
 class Field final : public VertexWarp {
  public:
-  /// What comes back through the direction that is scattered into at a vertex of a cell.
+  /// What comes back to a vertex of a cell, by light sampling or through the direction that is scattered into.
   struct Return {
     float mean = 0;     ///< luminance over the throughput at the vertex
-    float learned = 0;  ///< share of the learned density in that of the scattering; the rest is uniform
+    float learned = 0;  ///< share of the learned density in that of the numbers; the rest is uniform
+  };
+  struct Returns {
+    Return light, scatter;
   };
   /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers.
   Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-        std::vector<CumulativeProbability> scatter, std::vector<Return> returns);
+        std::vector<CumulativeProbability> scatter, std::vector<Returns> returns);
 
   std::string family() const override { return "field"; }
   /// A place is a cell.
@@ -50,6 +53,10 @@ class Field final : public VertexWarp {
   const FieldTree& tree() const { return m_tree; }
   const FieldGrids& grids() const { return m_grids; }
 
+  SurfaceKind kind(std::uint32_t cell) const { return m_kinds[cell]; }
+  const Return& returns(VertexNumbers which, std::uint32_t cell) const {
+    return which == VertexNumbers::light ? m_returns[cell].light : m_returns[cell].scatter;
+  }
   /// The density of a cell; null for FieldTree::kNoCell.
   const CumulativeProbability* density(VertexNumbers which, std::uint32_t cell) const;
 
@@ -58,7 +65,7 @@ class Field final : public VertexWarp {
   FieldGrids m_grids;
   std::vector<SurfaceKind> m_kinds;  // of each cell
   std::vector<CumulativeProbability> m_light, m_scatter;
-  std::vector<Return> m_returns;
+  std::vector<Returns> m_returns;
 };
 
 }  // namespace warpath

@@ -64,10 +64,10 @@ Field example(const Vertices& vertices, int light_parts) {
   const FieldGrids grids(light_parts);
   std::vector<CumulativeProbability> light(tree.cells() * grids.light.stored());
   std::vector<CumulativeProbability> scatter(tree.cells() * grids.diffuse.stored());
-  std::vector<Field::Return> returns;
+  std::vector<Field::Returns> returns;
   for (std::uint32_t c = 0; c < tree.cells(); ++c) {
     // The least density is a sixth.
-    returns.push_back({kMeanReturn, 0.85f});
+    returns.push_back({{1, 0.5f}, {kMeanReturn, 0.85f}});
     const auto fill = [&](const HalvingGrid& grid, std::vector<CumulativeProbability>& densities) {
       std::vector<float> mass(grid.bins());
       for (std::uint32_t b = 0; b < grid.bins(); ++b)
@@ -195,7 +195,7 @@ TEST(Field, BrokenFilesAreErrors) {
   });
   broken([](TensorFile& file) {
     const std::vector<float> few(4);
-    file.put<float>("returns", {2, 2}, few);
+    file.put<float>("returns", {1, 4}, few);
   });
   broken([](TensorFile& file) {
     const std::vector<std::uint8_t> few(3);

@@ -44,7 +44,7 @@ Neural example(int light_parts, const Layout& numbers = {}) {
   const FieldGrids grids(light_parts);
   std::vector<CumulativeProbability> light(tree.cells() * grids.light.stored());
   std::vector<CumulativeProbability> scatter(tree.cells() * grids.diffuse.stored());
-  std::vector<Field::Return> returns(tree.cells());
+  std::vector<Field::Returns> returns(tree.cells());
   for (std::uint32_t c = 0; c < tree.cells(); ++c) {
     const auto fill = [&](const HalvingGrid& grid, std::vector<CumulativeProbability>& densities) {
       std::vector<float> mass(grid.bins());
