@@ -1,5 +1,6 @@
 #include "core/latents.h"
 
+#include <algorithm>
 #include <array>
 #include <type_traits>
 
@@ -51,7 +52,15 @@ void Latents::assign(Sampler sampler, std::uint64_t seed, std::span<const std::u
 template <class T, class LaneOf>
 void Latents::fill(std::uint32_t dimension, std::size_t count, const LaneOf& lane_of, T* numbers) const {
   if (m_sampler == Sampler::independent) {
-    for (std::size_t i = 0; i < count; ++i) numbers[i] = to_unit<T>(sample_bits(m_keys[lane_of(i)], dimension));
+    // Keys first, so that the hash of several is computed at once.
+    constexpr std::size_t kChunk = 64;
+    std::array<std::uint64_t, kChunk> keys;
+    for (std::size_t first = 0; first < count; first += kChunk) {
+      const std::size_t n = std::min(kChunk, count - first);
+      for (std::size_t i = 0; i < n; ++i) keys[i] = m_keys[lane_of(first + i)];
+      T* out = numbers + first;
+      for (std::size_t i = 0; i < n; ++i) out[i] = to_unit<T>(sample_bits(keys[i], dimension));
+    }
     return;
   }
   const int place = place_in_block(m_sampler, dimension);

@@ -20,7 +20,9 @@ inline std::uint64_t sample_bits(std::uint64_t key, std::uint32_t d) {
 }
 /// Uniform in [0,1): 24 and 53 random bits. Both are roundings of the same number, so a float path and a double y
 /// agree.
-inline float to_unit_float(std::uint64_t bits) { return static_cast<float>(bits >> 40) * 0x1p-24f; }
+inline float to_unit_float(std::uint64_t bits) {
+  return static_cast<float>(static_cast<std::int32_t>(bits >> 40)) * 0x1p-24f;
+}
 inline double to_unit_double(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
 inline float sample_float(std::uint64_t key, std::uint32_t d) { return to_unit_float(sample_bits(key, d)); }
 inline double sample_double(std::uint64_t key, std::uint32_t d) { return to_unit_double(sample_bits(key, d)); }

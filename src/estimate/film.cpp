@@ -13,9 +13,11 @@ Film::Film(const FilmSettings& settings, Weights weights, Errors errors)
       m_filter(settings.filter),
       m_weights(weights),
       m_errors(errors),
-      m_sums(static_cast<std::size_t>(m_width) * static_cast<std::size_t>(m_height)),
-      m_integral_x(filter_integrals(settings.filter, m_width)),
-      m_integral_y(filter_integrals(settings.filter, m_height)) {
+      m_sums(static_cast<std::size_t>(m_width) * static_cast<std::size_t>(m_height)) {
+  if (weights == Weights::expected) {
+    m_integral_x = filter_integrals(settings.filter, m_width);
+    m_integral_y = filter_integrals(settings.filter, m_height);
+  }
   const auto taps = static_cast<std::size_t>(2 * std::ceil(m_filter.radius) + 2);
   for (Splat* splat : {&m_splat, &m_other}) {
     splat->x.resize(taps);

@@ -55,17 +55,24 @@ void occluded_analytic(const RTCOccludedFunctionNArguments* args) {
   }
 }
 
+// Copies between arrays and a packet; whole packets by a few instructions.
+void copy(void* to, const void* from, unsigned n) {
+  if (n == kWidth)
+    std::memcpy(to, from, kWidth * sizeof(float));
+  else
+    std::memcpy(to, from, n * sizeof(float));
+}
+
 // Copies n <= kWidth rays into a packet; the lanes beyond are switched off.
 void load_packet(const RayStream& rays, std::size_t first, unsigned n, int* valid, RTCRay16& packet) {
-  const std::size_t bytes = n * sizeof(float);
-  std::memcpy(packet.org_x, rays.ox + first, bytes);
-  std::memcpy(packet.org_y, rays.oy + first, bytes);
-  std::memcpy(packet.org_z, rays.oz + first, bytes);
-  std::memcpy(packet.dir_x, rays.dx + first, bytes);
-  std::memcpy(packet.dir_y, rays.dy + first, bytes);
-  std::memcpy(packet.dir_z, rays.dz + first, bytes);
-  std::memcpy(packet.tfar, rays.t_max + first, bytes);
-  std::memcpy(packet.time, rays.time + first, bytes);
+  copy(packet.org_x, rays.ox + first, n);
+  copy(packet.org_y, rays.oy + first, n);
+  copy(packet.org_z, rays.oz + first, n);
+  copy(packet.dir_x, rays.dx + first, n);
+  copy(packet.dir_y, rays.dy + first, n);
+  copy(packet.dir_z, rays.dz + first, n);
+  copy(packet.tfar, rays.t_max + first, n);
+  copy(packet.time, rays.time + first, n);
   for (unsigned i = 0; i < kWidth; ++i) {
     valid[i] = i < n ? -1 : 0;
     packet.tnear[i] = 0;
@@ -174,15 +181,14 @@ void EmbreeScene::intersect(const RayStream& rays, std::size_t n, const HitStrea
     std::memset(packet.hit.geomID, 0xff, sizeof(packet.hit.geomID));
     std::memset(packet.hit.instID, 0xff, sizeof(packet.hit.instID));
     rtcIntersect16(valid, m_impl->scene, &context, &packet);
-    const std::size_t bytes = count * sizeof(float);
-    std::memcpy(hits.t + first, packet.ray.tfar, bytes);
-    std::memcpy(hits.u + first, packet.hit.u, bytes);
-    std::memcpy(hits.v + first, packet.hit.v, bytes);
-    std::memcpy(hits.nx + first, packet.hit.Ng_x, bytes);
-    std::memcpy(hits.ny + first, packet.hit.Ng_y, bytes);
-    std::memcpy(hits.nz + first, packet.hit.Ng_z, bytes);
-    std::memcpy(hits.shape + first, packet.hit.geomID, bytes);
-    std::memcpy(hits.primitive + first, packet.hit.primID, bytes);
+    copy(hits.t + first, packet.ray.tfar, count);
+    copy(hits.u + first, packet.hit.u, count);
+    copy(hits.v + first, packet.hit.v, count);
+    copy(hits.nx + first, packet.hit.Ng_x, count);
+    copy(hits.ny + first, packet.hit.Ng_y, count);
+    copy(hits.nz + first, packet.hit.Ng_z, count);
+    copy(hits.shape + first, packet.hit.geomID, count);
+    copy(hits.primitive + first, packet.hit.primID, count);
   }
 }
 

@@ -1,4 +1,5 @@
 // What happens at vertices: light sampling, BSDF sampling and Russian roulette.
+#include <algorithm>
 #include <limits>
 
 #include "tracer/path_loop.h"
@@ -114,9 +115,30 @@ void PathLoop::sample_bsdfs(std::uint16_t bounce, PathRecorder* recorder) {
     ordered.u0[k] = w.dir.u0[j];
     ordered.u1[k] = w.dir.u1[j];
   }
-  const auto go_on = [&](std::size_t k, const Vec3& wo, const Color& weight, float pdf, float eta, bool null) {
-    const std::uint32_t j = w.order[k], lane = w.vertex_lanes[j];
+  for (const Workspace::Group& group : w.groups) {
+    if (group.plain) {
+      sample_plain(*group.plain, w.plain, group.begin, group.end, w.ordered_choice, ordered.u0, ordered.u1,
+                   w.samples.wo, w.value, w.pdf);
+      std::fill(w.step_eta + group.begin, w.step_eta + group.end, 1.0f);
+      std::fill(w.straight_on + group.begin, w.straight_on + group.end, std::uint8_t{0});
+      continue;
+    }
+    for (std::size_t k = group.begin; k < group.end; ++k) {
+      if (k + kScatterAhead < group.end) prefetch(w.scatter[k + kScatterAhead]);
+      const BsdfSample s = sample_bsdf(w.scatter[k], w.ordered_choice[k], {ordered.u0[k], ordered.u1[k]});
+      w.samples.wo.set(k, s.wo);
+      w.value.set(k, {s.weight.x, s.weight.y, s.weight.z});
+      w.pdf[k] = s.delta ? 0.0f : s.pdf;
+      w.step_eta[k] = s.eta;
+      w.straight_on[k] = s.null;
+    }
+  }
+  // Back in the order of paths.
+  m_rays = 0;
+  for (std::size_t j = 0; j < m_vertices; ++j) {
+    const std::uint32_t k = w.rank[j], lane = w.vertex_lanes[j];
     const float inv_q = (weigh_lobe ? w.lobe.inv_q[j] : 1.0f) * (weigh_dir ? w.dir.inv_q[j] : 1.0f);
+    const Color weight = w.value.color(k);
     if (recorder) {
       recorder->number(j, kLobe, w.lobe.u0[j]);
       recorder->number(j, kDir, w.dir.u0[j]);
@@ -125,36 +147,17 @@ void PathLoop::sample_bsdfs(std::uint16_t bounce, PathRecorder* recorder) {
       recorder->step(j, weight * inv_q);
     }
     const Color beta = w.beta.color(lane) * weight;
-    w.goes_on[j] = !is_zero(beta);
-    if (!w.goes_on[j]) return;
+    if (is_zero(beta)) continue;
     w.beta.set(lane, {beta.x, beta.y, beta.z});
     w.weight[lane] *= inv_q;
-    w.eta[lane] *= eta;
-    w.previous.set(lane, w.position[k]);
-    w.previous_pdf[lane] = pdf;
-    if (!null) w.straight[lane] = 0;
-    // In the place of a ray that has been used up.
-    w.rays.set(j, offset_point(w.position[k], w.ng[k], wo), wo, kEndless, w.time[k]);
-  };
-  for (const Workspace::Group& group : w.groups) {
-    if (group.plain) {
-      sample_plain(*group.plain, w.plain, group.begin, group.end, w.ordered_choice, ordered.u0, ordered.u1,
-                   w.samples.wo, w.value, w.pdf);
-      for (std::size_t k = group.begin; k < group.end; ++k)
-        go_on(k, w.samples.wo[k], w.value.color(k), w.pdf[k], 1, false);
-      continue;
-    }
-    for (std::size_t k = group.begin; k < group.end; ++k) {
-      if (k + kScatterAhead < group.end) prefetch(w.scatter[k + kScatterAhead]);
-      const BsdfSample s = sample_bsdf(w.scatter[k], w.ordered_choice[k], {ordered.u0[k], ordered.u1[k]});
-      go_on(k, s.wo, s.weight, s.delta ? 0.0f : s.pdf, s.eta, s.null);
-    }
-  }
-  m_rays = 0;
-  for (std::size_t j = 0; j < m_vertices; ++j) {
-    if (!w.goes_on[j]) continue;
-    w.rays.set(m_rays, w.rays.origin(j), w.rays.direction(j), kEndless, w.rays.time[j]);
-    w.lanes[m_rays] = w.vertex_lanes[j];
+    w.eta[lane] *= w.step_eta[k];
+    const Vec3 position = w.position[k], wo = w.samples.wo[k];
+    w.previous.set(lane, position);
+    w.previous_pdf[lane] = w.pdf[k];
+    w.straight[lane] &= w.straight_on[k];
+    // In the place of a ray that has been used up; `subset` remembers its vertex.
+    w.rays.set(m_rays, offset_point(position, w.ng[k], wo), wo, kEndless, w.time[k]);
+    w.lanes[m_rays] = lane;
     w.subset[m_rays++] = static_cast<std::uint32_t>(j);
   }
 }

@@ -90,7 +90,10 @@ void PathLoop::group_by_material() {
     group.begin = begin;
     begin += std::exchange(group.end, begin);
   }
-  for (std::size_t j = 0; j < m_vertices; ++j) w.order[find(material[j]).end++] = static_cast<std::uint32_t>(j);
+  for (std::size_t j = 0; j < m_vertices; ++j) {
+    w.rank[j] = static_cast<std::uint32_t>(find(material[j]).end++);
+    w.order[w.rank[j]] = static_cast<std::uint32_t>(j);
+  }
   for (const Workspace::Group& group : w.groups) w.group_of[static_cast<std::size_t>(group.bsdf)] = 0;
 }
 

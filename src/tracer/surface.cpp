@@ -35,7 +35,13 @@ Surfaces::Surfaces(std::span<const Shape> shapes, const Materials& materials) {
     entry.needs_tangents = shape.bsdf >= 0 && materials.needs_tangents(shape.bsdf);
     entry.needs_uv = entry.needs_tangents || shape.emitter >= 0 || (shape.bsdf >= 0 && materials.needs_uv(shape.bsdf));
     if ((entry.mesh = std::get_if<Mesh>(&shape.geometry))) {
-      m_any_moves |= !entry.mesh->positions_end.empty();
+      const Mesh& mesh = *entry.mesh;
+      entry.indices = mesh.indices.data();
+      entry.normals = mesh.normals.empty() ? nullptr : mesh.normals.data();
+      entry.uvs = mesh.uvs.empty() ? nullptr : mesh.uvs.data();
+      entry.side = mesh.flip_normals ? -1.0f : 1.0f;
+      entry.moves = !mesh.normals_end.empty();
+      m_any_moves |= !mesh.positions_end.empty();
     } else if ((entry.rectangle = std::get_if<Rectangle>(&shape.geometry))) {
       entry.rectangle_normal = warpath::rectangle_normal(*entry.rectangle, 0);
       m_any_moves |= entry.rectangle->to_world[0] != entry.rectangle->to_world[1];
@@ -77,41 +83,39 @@ Vec3 Surfaces::at(const HitStream& hits, std::size_t i, const RayStream& rays, S
 void Surfaces::prefetch_triangle(const HitStream& hits, std::size_t i) const {
   if (hits.shape[i] == kNoHit) return;
   const Entry& shape = m_shapes[hits.shape[i]];
-  if (shape.mesh) __builtin_prefetch(shape.mesh->indices.data() + 3 * static_cast<std::size_t>(hits.primitive[i]));
+  if (shape.indices) __builtin_prefetch(shape.indices + 3 * static_cast<std::size_t>(hits.primitive[i]));
 }
 
 void Surfaces::prefetch_vertices(const HitStream& hits, std::size_t i) const {
   if (hits.shape[i] == kNoHit) return;
   const Entry& shape = m_shapes[hits.shape[i]];
-  if (!shape.mesh) return;
-  const Mesh& mesh = *shape.mesh;
-  const std::uint32_t* index = mesh.indices.data() + 3 * static_cast<std::size_t>(hits.primitive[i]);
-  for (int k = 0; k < 3; ++k) {
-    if (!mesh.normals.empty()) __builtin_prefetch(mesh.normals.data() + index[k]);
-    if (shape.needs_uv && !mesh.uvs.empty()) __builtin_prefetch(mesh.uvs.data() + index[k]);
-  }
+  if (!shape.indices) return;
+  const std::uint32_t* index = shape.indices + 3 * static_cast<std::size_t>(hits.primitive[i]);
+  if (shape.normals)
+    for (int k = 0; k < 3; ++k) __builtin_prefetch(shape.normals + index[k]);
+  if (shape.needs_uv && shape.uvs)
+    for (int k = 0; k < 3; ++k) __builtin_prefetch(shape.uvs + index[k]);
 }
 
 void Surfaces::mesh_at(const Entry& shape, std::uint32_t primitive, float u, float v, float time,
                        SurfacePoint& point) const {
-  const Mesh& mesh = *shape.mesh;
-  const std::uint32_t* index = mesh.indices.data() + 3 * static_cast<std::size_t>(primitive);
+  const std::uint32_t* index = shape.indices + 3 * static_cast<std::size_t>(primitive);
   const std::uint32_t i0 = index[0], i1 = index[1], i2 = index[2];
-  const float side = mesh.flip_normals ? -1.0f : 1.0f;
-  point.ng *= side;
+  point.ng *= shape.side;
 
   Vec3 dn1(0), dn2(0);  // change of the shading normal along the barycentric axes
-  if (mesh.normals.empty()) {
+  if (!shape.normals) {
     point.ns = point.ng;
   } else {
-    Vec3 n0 = mesh.normals[i0], n1 = mesh.normals[i1], n2 = mesh.normals[i2];
-    if (!mesh.normals_end.empty()) {
+    Vec3 n0 = shape.normals[i0], n1 = shape.normals[i1], n2 = shape.normals[i2];
+    if (shape.moves) {
+      const Mesh& mesh = *shape.mesh;
       n0 = lerp(n0, mesh.normals_end[i0], time);
       n1 = lerp(n1, mesh.normals_end[i1], time);
       n2 = lerp(n2, mesh.normals_end[i2], time);
     }
     const Vec3 n = n0 * (1 - u - v) + n1 * u + n2 * v;
-    const float inverse_length = side / std::sqrt(n.dot(n));
+    const float inverse_length = shape.side / std::sqrt(n.dot(n));
     point.ns = n * inverse_length;
     if (shape.needs_tangents) {
       const auto project = [&](const Vec3& d) { return d - point.ns * point.ns.dot(d); };
@@ -122,17 +126,19 @@ void Surfaces::mesh_at(const Entry& shape, std::uint32_t primitive, float u, flo
 
   if (!shape.needs_uv) return;
   Vec2 duv1(1, 0), duv2(0, 1);
-  if (mesh.uvs.empty()) {
+  if (!shape.uvs) {
     // Mitsuba turns a triangle by naming its vertices backwards, which changes who is first.
-    point.uv = mesh.flip_normals ? Vec2(u, 1 - u - v) : Vec2(u, v);
-    if (mesh.flip_normals) duv1 = {1, -1}, duv2 = {0, -1};
+    const bool backwards = shape.side < 0;
+    point.uv = backwards ? Vec2(u, 1 - u - v) : Vec2(u, v);
+    if (backwards) duv1 = {1, -1}, duv2 = {0, -1};
   } else {
-    const Vec2 uv0 = mesh.uvs[i0];
-    duv1 = mesh.uvs[i1] - uv0;
-    duv2 = mesh.uvs[i2] - uv0;
+    const Vec2 uv0 = shape.uvs[i0];
+    duv1 = shape.uvs[i1] - uv0;
+    duv2 = shape.uvs[i2] - uv0;
     point.uv = uv0 + duv1 * u + duv2 * v;
   }
   if (!shape.needs_tangents) return;
+  const Mesh& mesh = *shape.mesh;
   Vec3 p0 = mesh.positions[i0], p1 = mesh.positions[i1], p2 = mesh.positions[i2];
   if (!mesh.positions_end.empty()) {
     p0 = lerp(p0, mesh.positions_end[i0], time);

@@ -32,6 +32,12 @@ class Surfaces {
  private:
   struct Entry {
     const Mesh* mesh = nullptr;
+    // Of the mesh: its buffers, or null where it has none.
+    const std::uint32_t* indices = nullptr;
+    const Vec3* normals = nullptr;
+    const Vec2* uvs = nullptr;
+    float side = 1;      // -1 under flip_normals
+    bool moves = false;  // so that its normals do
     const Rectangle* rectangle = nullptr;
     const AnalyticShape* analytic = nullptr;
     Vec3 rectangle_normal;  // of a rectangle that stands still

@@ -55,8 +55,8 @@ void Workspace::resize(std::size_t n) {
   lanes = indices();
   rays = ray_stream();
   hits = {floats(), floats(), floats(), floats(), floats(), floats(), indices(), indices()};
-  vertex_lanes = indices(), vertex_hit = indices(), slot = indices();
-  smooth = bytes(), goes_on = bytes();
+  vertex_lanes = indices(), vertex_hit = indices(), slot = indices(), rank = indices();
+  smooth = bytes();
   order = indices();
   position = vectors();
   ng = vectors();
@@ -66,7 +66,7 @@ void Workspace::resize(std::size_t n) {
   uv[0] = floats(), uv[1] = floats();
   ordered_choice = floats(), ordered = numbers();
   samples = {vectors(), floats(), floats(), vectors()};
-  value = vectors(), pdf = floats();
+  value = vectors(), pdf = floats(), step_eta = floats(), straight_on = bytes();
   context = contexts();
   film = numbers(), lens = numbers(), shutter = numbers();
   light = numbers(), light_uv = numbers(), lobe = numbers(), dir = numbers(), roulette = numbers();

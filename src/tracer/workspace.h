@@ -72,11 +72,12 @@ struct Workspace {
   // One entry per vertex, in the order of their paths, in which numbers are drawn.
   std::uint32_t* vertex_lanes;  ///< its path
   std::uint32_t* vertex_hit;    ///< the ray that met it
-  std::uint8_t *smooth, *goes_on;
+  std::uint8_t* smooth;
   ContextArrays context;
   DrawnNumbers film, lens, shutter, light, light_uv, lobe, dir, roulette;
   float* survival;  ///< probability with which the renderer's roulette lets a ray go on
   std::uint32_t* slot;  ///< its place among the smooth ones
+  std::uint32_t* rank;  ///< its place in the order below
 
   // The same vertices in the order in which they are shaded: grouped by material. order[k] is the place of the k-th in
   // the arrays above.
@@ -98,6 +99,8 @@ struct Workspace {
   LightSamples samples;
   Vec3Array value;  ///< of the BSDF towards a light; or what the throughput is multiplied with
   float* pdf;
+  float* step_eta;            ///< relative index of refraction on the way that BSDF sampling took
+  std::uint8_t* straight_on;  ///< 1 if that was a null lobe's
 
   // Subsets of the vertices: subset[i] is a vertex, subset_lanes[i] its path.
   std::uint32_t *subset, *subset_lanes;
