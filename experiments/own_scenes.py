@@ -1,13 +1,13 @@
 """Experiments of the paper on scenes that are written for this project."""
 
 from curves import error_charts
-from pictures import densities_of, images_of, side_by_side, stacked, write_png
+from pictures import densities_of, images_of, side_by_side, stacked, write_comparison, write_png
 from plot import line_chart
 from tables import column, comparison_table, gain, mean, of_method, rows_of, standard_error, write_table
 from tool import compare, crop, folder_of, own_scene, render_reference
 
 FILM = {"size": "160x90", "max_depth": 6}
-SIZES = {**FILM, "spp": 128, "runs": 3}
+SIZES = {**FILM, "spp": 128, "runs": 5}
 # Where Real NVP misses a caustic, its samples weigh up to 1 / this many times what a uniform one does.
 SHARE = {"uniform": 0.3}
 WARPS_4D = ["kdtree:film+bounce1", "realnvp:film+bounce1"]
@@ -50,15 +50,11 @@ def billiards():
     folder = folder_of("billiards")
     write_table(folder, comparison_table(results))
     error_charts(folder, results)
-    write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(images_of(folder, ["none", *WARPS_4D], zoom=2))]))
+    write_comparison(folder, ["none", *WARPS_4D], zoom=2)
     # The white ball's streak alone, where the place on the film depends on time: the true density, kd-tree, Real NVP.
     compare("billiards/streak", scene, blurred, **{**options, "runs": 1, "spp": 1}, reference_spp=8, **crop(FILM, 0.08, 0.50, 0.31, 0.29))
     true_and_learned = [densities_of(folder / "streak", blurred, *axes) for axes in (("film.x", "time"), ("film.x", "film.y"))]
     write_png(folder / "densities.png", stacked([side_by_side(strip) for strip in true_and_learned]))
-
-
-def pairs(pictures):
-    return [pictures[k : k + 2] for k in range(0, len(pictures), 2)]
 
 
 LIGHT = "film+bounce1.light"
@@ -85,8 +81,7 @@ def light_choice(label, depth, dims):
     folder = folder_of(label)
     write_table(folder, comparison_table(results))
     error_charts(folder, results)
-    shown = images_of(folder, ["none", f"kdtree:{LIGHT}", f"realnvp:{LIGHT}"], zoom=2)
-    write_png(folder / "images.png", stacked([side_by_side(strip) for strip in pairs(shown)]))
+    write_comparison(folder, ["none", f"kdtree:{LIGHT}", f"realnvp:{LIGHT}"], zoom=2)
 
 
 def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
@@ -98,6 +93,8 @@ def alpha(alphas=(1.5, 2, 4, 8, 16, 32, 64)):
     measure = {**film, "spp": 64, "runs": 6, **render_reference("alpha", scene, 1024, "field", objective="mse", **film)}
     base = compare("alpha/baselines", scene, ["none", "uniform:film+bounce1"], **measure)
     table = ["| α | candidates | candidates, CPU s | resampling, CPU s | gain over uniform | held-out loss |", "|---|---|---|---|---|---|"]
+    table += [f"| `{name}` | | | | {{:.2f}} ± {{:.2f}} | |".format(*gain(of_method(base, "uniform:film+bounce1"), of_method(base, name), "mse"))
+              for name in ("none", "uniform:film+bounce1")]  # fmt: skip
     line, loss_line, times = [], [], []
     for a in alphas:
         runs = compare(f"alpha/{a:g}", scene, ["realnvp:film+bounce1"], **measure, alpha=a, examples=20000, max_steps=200)

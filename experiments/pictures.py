@@ -84,6 +84,12 @@ def images_of(folder, methods, **options):
     return [image_rows(by_method[method], **options) for method in methods] + [image_rows(data["reference"], **options)]
 
 
+def write_comparison(folder, methods, zoom=1):
+    """images.png: three methods' images and the reference, in two strips."""
+    pictures = images_of(folder, methods, zoom=zoom)
+    write_png(folder / "images.png", stacked([side_by_side(pictures[:2]), side_by_side(pictures[2:])]))
+
+
 def densities_of(folder, methods, x, y):
     """Rows of the true density over two numbers (the candidates'), then of what each method learned of it."""
     found = {d["method"]: d for d in page_data(folder)["densities"] if (d["x_dimension"], d["y_dimension"]) == (x, y)}

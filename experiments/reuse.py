@@ -29,6 +29,9 @@ def reuse():
         base = compare(f"reuse/{angle}/baselines", scene, ["none", "uniform:film+bounce1"], **turned, **measure)
         fielded = compare(f"reuse/{angle}/field", scene, ["field", field], **turned, **measure)
         fields += comparison_table(base + [{**run, "method": "field, trained before" if run["method"] == str(field) else "field"} for run in fielded])
+        for name in ("none", "uniform:film+bounce1"):
+            gained = gain(of_method(base, "uniform:film+bounce1"), of_method(base, name), "mse")
+            table.append(f"| {angle}° | `{name}` | | | | {gained[0]:.2f} ± {gained[1]:.2f} |")
         losses, gains = {}, {}
         for start, init in (("from scratch", {}), ("reused weights", {"init": weights})):
             for steps in STEPS:

@@ -1,12 +1,15 @@
 """Experiments on the Country Kitchen and the White Room, which are read from WARPATH_SCENES."""
 
 from curves import error_charts
+from pictures import write_comparison
 from plot import line_chart
 from tables import column, comparison_table, gain, mean, of_method, rows_of, write_table
 from tool import compare, folder_of, own_scene, peak_memory, shared_scene, stored_reference, train
 
 PAPER = {"size": "320x180", "max_depth": 8, "spp": 128, "epp": 16, "runs": 3}
-WARPS_4D = ["uniform:film+bounce1", "kdtree:film+bounce1", "realnvp:film+bounce1", "realnvp:film+bounce1.lobe+bounce1"]
+WARPS_4D = ["uniform:film+bounce1", "kdtree:film+bounce1", "realnvp:film+bounce1"]
+LOBE_5D = [f"{family}:film+bounce1.lobe+bounce1" for family in ("uniform", "realnvp")]
+DEEPER = [f"{family}:film+bounce1+{more}" for more in ("bounce2", "bounce2+bounce3") for family in ("uniform", "realnvp")]
 BOTH = ("country-kitchen", "white-room")
 TWELVE = "film+" + "+".join(f"bounce{k}" for k in range(1, 6))
 
@@ -18,20 +21,20 @@ def reference(name):
 
 def kitchen():
     """Country Kitchen, epp-16, 128 spp: plain path tracing, kd-tree, Real NVP in 4D, 5D, 6D and 8D."""
-    deeper = ["uniform:film+bounce1+bounce2", "realnvp:film+bounce1+bounce2", "realnvp:film+bounce1+bounce2+bounce3"]
-    results = compare("kitchen", shared_scene("country-kitchen"), ["none", *WARPS_4D, *deeper], **PAPER, **reference("country-kitchen"))
+    methods = ["none", *WARPS_4D, *LOBE_5D, *DEEPER]
+    results = compare("kitchen", shared_scene("country-kitchen"), methods, **PAPER, **reference("country-kitchen"))
     write_table(folder_of("kitchen"), comparison_table(results))
 
 
 def white_room():
     """The White Room, the same in 4D and 5D."""
-    results = compare("white-room", shared_scene("white-room"), ["none", *WARPS_4D], **PAPER, **reference("white-room"))
+    results = compare("white-room", shared_scene("white-room"), ["none", *WARPS_4D, *LOBE_5D], **PAPER, **reference("white-room"))
     write_table(folder_of("white-room"), comparison_table(results))
 
 
 def white_room_epp():
     """More training examples, epp 1, 4, 16 and 64: what each gains on the White Room."""
-    scene, methods, options, lines = shared_scene("white-room"), WARPS_4D[1:3], {**PAPER, "spp": 64, **reference("white-room")}, {}
+    scene, methods, options, lines = shared_scene("white-room"), WARPS_4D[1:], {**PAPER, "spp": 64, **reference("white-room")}, {}
     del options["epp"]
     base = compare("white-room-epp/baselines", scene, ["none", WARPS_4D[0]], **options)
     table = comparison_table(base)
@@ -48,17 +51,18 @@ def white_room_epp():
 def error_curves():
     """Error over samples and over CPU time on both scenes, with error bars over the seeds; the field too, which learns while it renders."""
     for name in BOTH:
-        results = compare(f"error-curves/{name}", shared_scene(name), ["none", *WARPS_4D[:3], "field"], **{**PAPER, "spp": 64}, objective="mse", **reference(name))
+        results = compare(f"error-curves/{name}", shared_scene(name), ["none", *WARPS_4D, "field"], **{**PAPER, "spp": 64}, objective="mse", **reference(name))
         folder = folder_of(f"error-curves/{name}")
         write_table(folder, comparison_table(results))
         error_charts(folder, results)
+        write_comparison(folder, ["none", *WARPS_4D[1:]])
 
 
 def published_kdtree():
     """The kd-tree as Guo et al. describe it: cells split in the middle, dimensions in turn, density by the mean."""
     for name in BOTH:
         label = f"published-kdtree/{name}"
-        results = compare(label, shared_scene(name), ["none", "kdtree:film+bounce1"], **PAPER, **reference(name),
+        results = compare(label, shared_scene(name), ["none", *WARPS_4D[:2]], **PAPER, **reference(name),
                           kdtree_split="cyclic", kdtree_target="mean")  # fmt: skip
         write_table(folder_of(label), comparison_table(results))
 
@@ -67,8 +71,8 @@ def published_realnvp():
     """Real NVP trained as published: separate networks, no encoding, batch normalisation, maximum likelihood."""
     for name in BOTH:
         label = f"published-realnvp/{name}"
-        results = compare(label, shared_scene(name), ["none", "realnvp:film+bounce1"], **PAPER, **reference(name), loss="likelihood",
-                          networks="separate", encoding_bins=0, masks="alternating", bn="batch", couplings=8, width=64, rate=1e-3)  # fmt: skip
+        results = compare(label, shared_scene(name), ["none", WARPS_4D[0], WARPS_4D[2]], **PAPER, **reference(name), loss="likelihood",
+                          networks="separate", encoding_bins=0, masks="alternating", bn="batch", couplings=8, width=64, rate=1e-3, jitter=0)  # fmt: skip
         write_table(folder_of(label), comparison_table(results))
 
 
@@ -76,11 +80,12 @@ def training_time():
     """MSE gain over training time on the Country Kitchen, one run a point: Real NVP by steps, kd-tree by candidates."""
     scene, options = shared_scene("country-kitchen"), {"size": "320x180", "max_depth": 8}
     measure = {"spp": 64, **reference("country-kitchen")}
-    none = mean(column(compare("training-time/none", scene, ["none"], **options, **measure), "mse"))
+    base = compare("training-time/baselines", scene, ["none", WARPS_4D[0]], **options, **measure)
+    none, uniform = (mean(column(of_method(base, method), "mse")) for method in ("none", WARPS_4D[0]))
     budgets = [("realnvp", f"{n} steps", {"max_steps": n}) for n in (50, 150, 400, 1000, 3000)]
     budgets += [("kdtree", f"epp-{k}", {"epp": k}) for k in (0.5, 2, 8, 16, 64)]
     lines = {"realnvp": [], "kdtree": []}
-    table = ["| warp | budget | CPU seconds of training | gain in MSE |", "|---|---|---|---|"]
+    table = ["| warp | budget | CPU seconds of training | gain in MSE |", "|---|---|---|---|", "| none | | | 1 |", f"| uniform | | | {none / uniform:.2f} |"]
     for family, budget, training in budgets:
         label = f"training-time/{family}-{budget.replace(' ', '-')}"
         warp, seconds, _ = train(label, scene, f"{family}:film+bounce1", **options, **training)

@@ -30,7 +30,7 @@ def shared_scene(name):
     """A scene that is not the project's own."""
     folder = os.environ.get("WARPATH_SCENES")
     if not folder:
-        sys.exit("set WARPATH_SCENES to the folder that holds country-kitchen/ and white-room/ (docs/results.md says where they are from)")
+        sys.exit("set WARPATH_SCENES to the folder that holds country-kitchen/ and white-room/ (README.md says where they are from)")
     scene = pathlib.Path(folder) / name / "scene.xml"
     if not scene.exists():
         sys.exit(f"{scene}: no such scene")

@@ -214,6 +214,7 @@ void bind_training(nb::module_& m) {
       .def_rw("max_steps", &TrainingOptions::max_steps, nb::arg().none())
       .def_rw("bins", &TrainingOptions::bins, nb::arg().none())
       .def_rw("rate", &TrainingOptions::rate, nb::arg().none())
+      .def_rw("jitter", &TrainingOptions::jitter, nb::arg().none())
       .def("candidate_count", [](const TrainingOptions& o) { return candidate_count(o.train_settings(0)); });
 
   nb::class_<Trained>(m, "Warp", "A trained proposal, see warpath.Warp.")

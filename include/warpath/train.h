@@ -17,9 +17,12 @@ struct FlowTraining {
   enum class Loss { likelihood, variance } loss = Loss::variance;
   double rate = 6e-3;  ///< Adam's step size at the start; it falls when the held-out loss no longer does
   int batch = 2000;
-  int max_steps = 10'000;    ///< training ends sooner, when the held-out loss no longer falls
-  double held_out = 0.05;    ///< share of the examples that is never trained on
-  double uniform = 0.1;      ///< share of uniform samples that Loss::variance counts on
+  int max_steps = 10'000;  ///< training ends sooner, when the held-out loss no longer falls
+  double held_out = 0.05;  ///< share of the examples that is never trained on
+  double uniform = 0.1;    ///< share of uniform samples that Loss::variance counts on
+  /// Each time an example is shown, it is moved by a Gaussian of jitter / sqrt(examples) in each dimension (as wide as
+  /// a slab that holds sqrt(examples) of them, times this), so that small sets are not learned by heart. 0: not at all.
+  double jitter = 0;
   double average = 0.998;    ///< decay per step of the moving average of the weights that is handed out; 0 for none
   int evaluate_every = 100;  ///< steps between evaluations of the held-out loss
   int patience = 3;    ///< evaluations without gain, after which the rate falls to a third, and at last training ends
@@ -28,6 +31,7 @@ struct FlowTraining {
 
 /// Settings of the Real NVP warp and its training. Defaults are the ones that docs/results.md measures.
 struct RealNvpSettings : FlowTraining {
+  RealNvpSettings() { jitter = 2; }
   int couplings = 16;
   int width = 32;
   int blocks = 1;      ///< residual blocks of two dense layers in each of s and t

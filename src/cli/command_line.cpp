@@ -63,6 +63,10 @@ void add_options(CLI::App& app, TrainingOptions& options) {
             nvp.bins, spline.encoding_bins)
       ->check(CLI::Range(0, 256));
   add_sized("--rate", options.rate, "Step size of Adam", nvp.rate, spline.rate)->check(CLI::PositiveNumber);
+  add_sized("--jitter", options.jitter,
+            "How far examples are moved each time they are shown, times the root of their number", nvp.jitter,
+            spline.jitter)
+      ->check(CLI::Range(0.0, 10.0));
   add_sized("--batch", options.batch, "Examples in a training step", nvp.batch, spline.batch)
       ->check(CLI::Range(64, 1 << 20));
   add_sized("--max-steps", options.max_steps, "Training steps at most", nvp.max_steps, spline.max_steps)

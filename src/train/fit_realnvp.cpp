@@ -16,6 +16,7 @@ RealNvpSettings released_realnvp() {
   s.width = 512;
   s.blocks = 8;
   s.rate = 1e-4;
+  s.jitter = 0;
   s.bins = 0;
   s.shared = false;
   s.loss = RealNvpSettings::Loss::likelihood;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "core/interrupt.h"
 #include "core/rng.h"
@@ -219,6 +220,37 @@ TEST(FitRealNvp, RareBrightExamplesDoNotRule) {
   for (const double l : log_q) EXPECT_LT(std::abs(l), 3);
 }
 
+/// Mean of -ln q over 20,000 examples of the ramp that no training has seen, in two dimensions.
+double loss_over_fresh_ramp(const Fit& fit) {
+  const Examples all = ramp(2, 40'000);
+  Matrix<double> y(20'000, 2);
+  for (std::size_t i = 0; i < y.rows(); ++i)
+    for (std::size_t d = 0; d < 2; ++d) y(i, d) = static_cast<double>(all.y(20'000 + i, d));
+  std::vector<double> log_q(y.rows());
+  fit.proposal->log_density(y.batch(), log_q);
+  return -std::accumulate(log_q.begin(), log_q.end(), 0.0) / static_cast<double>(log_q.size());
+}
+
+// 200 examples are learned by heart, unless they are moved each time they are shown. The last weights are judged, as
+// one evaluation is all there is.
+TEST(FitRealNvp, JitterKeepsSmallSetsFromBeingLearnedByHeart) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    RealNvpSettings s = small();
+    s.batch = 190;
+    s.bins = 15;
+    s.max_steps = s.evaluate_every = 1'000;
+    double loss[2], training_loss[2];
+    for (const bool moved : {false, true}) {
+      s.jitter = moved ? 1 : 0;
+      const Fit fit = fit_realnvp(ExampleSet(ramp(2, 200)), s, seed);
+      loss[moved] = loss_over_fresh_ramp(fit);
+      training_loss[moved] = fit.log.points.back().loss;
+    }
+    EXPECT_LT(loss[true], loss[false]) << seed;
+    EXPECT_GT(training_loss[true], training_loss[false]) << seed;
+  }
+}
+
 TEST(FitRealNvp, EndsWhenInterrupted) {
   g_interrupted = true;
   EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 1'000)), small(), 1), Interrupted);
@@ -228,6 +260,9 @@ TEST(FitRealNvp, EndsWhenInterrupted) {
 TEST(FitRealNvp, SettingsThatMakeNoSense) {
   RealNvpSettings s = small();
   s.held_out = 0;
+  EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 100)), s, 1), ConfigError);
+  s = small();
+  s.jitter = -0.1;
   EXPECT_THROW(fit_realnvp(ExampleSet(ramp(2, 100)), s, 1), ConfigError);
   s = small();
   s.batch = 0;

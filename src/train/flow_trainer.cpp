@@ -6,6 +6,7 @@
 
 #include "core/interrupt.h"
 #include "core/rng.h"
+#include "train/jitter.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -28,6 +29,8 @@ FlowTrainer::FlowTrainer(const CouplingFlow& flow, const TrainingSet& examples, 
   if (settings.batch < 1) throw ConfigError(fmt::format("batch {}: must be at least 1", settings.batch));
   if (!(settings.held_out > 0 && settings.held_out < 1))
     throw ConfigError(fmt::format("held_out {}: must be between 0 and 1", settings.held_out));
+  if (!(settings.jitter >= 0 && settings.jitter <= 10))
+    throw ConfigError(fmt::format("jitter {}: must be between 0 and 10", settings.jitter));
   const std::size_t held_out =
       std::min(kMostHeldOut, static_cast<std::size_t>(settings.held_out * static_cast<double>(count)));
   if (held_out < 1 || count < held_out + 1)
@@ -49,14 +52,16 @@ FlowTrainer::FlowTrainer(const CouplingFlow& flow, const TrainingSet& examples, 
   }
   if (m_order.empty() || !(m_held_out_weight > 0)) throw ConfigError("no example has any weight: nothing to train on");
   m_mean_weight /= static_cast<double>(m_order.size());
+  m_jitter = settings.jitter / std::sqrt(static_cast<double>(count));
   m_next = m_order.size();
 
   m_batch.resize(static_cast<std::size_t>(settings.batch), dims);
   next_batch();
 }
 
-void FlowTrainer::copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k) {
+void FlowTrainer::copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k, double width) {
   m_examples.primary_sample(i, m_y.data());
+  if (width > 0) jitter(m_y, width, mix64(m_order_seed), m_jittered++);
   to.set(k, m_y, weight, m_examples.target(i));
 }
 
@@ -75,7 +80,7 @@ void FlowTrainer::next_batch() {
   const double scale = 1 / (m_mean_weight * m_settings.batch);
   for (std::size_t i = 0; i < static_cast<std::size_t>(m_settings.batch); ++i) {
     const std::uint32_t e = next_example();
-    copy(e, static_cast<float>(static_cast<double>(m_examples.weight(e)) * scale), m_batch, i);
+    copy(e, static_cast<float>(static_cast<double>(m_examples.weight(e)) * scale), m_batch, i, m_jitter);
   }
 }
 

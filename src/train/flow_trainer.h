@@ -27,8 +27,8 @@ class FlowTrainer {
  private:
   void next_batch();
   std::uint32_t next_example();
-  /// Copies example i to place k of `to`, with the weight given.
-  void copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k);
+  /// Copies example i to place k of `to`, with the weight given; moved by `width`, where that is not 0.
+  void copy(std::size_t i, float weight, ExampleBlocks& to, std::size_t k, double width = 0);
   double held_out_loss(const nn::AlignedVector<float>& parameters) const;
 
   const CouplingFlow& m_flow;
@@ -41,6 +41,8 @@ class FlowTrainer {
   // Examples to train on, in an order of its own for every epoch.
   std::vector<std::uint32_t> m_order;
   std::uint64_t m_order_seed, m_epoch = 0;
+  double m_jitter = 0;           // standard deviation
+  std::uint64_t m_jittered = 0;  // examples that were moved so far
   std::size_t m_next = 0;
 };
 

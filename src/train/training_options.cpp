@@ -53,6 +53,7 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
   const bool likelihood = is_second("loss", loss, "variance", "likelihood");
   for (FlowTraining* flow : {static_cast<FlowTraining*>(&result.realnvp), static_cast<FlowTraining*>(&result.spline)}) {
     give(batch, flow->batch);
+    give(jitter, flow->jitter);
     give(max_steps, flow->max_steps);
     if (likelihood) flow->loss = FlowTraining::Loss::likelihood;
   }

@@ -21,7 +21,7 @@ struct TrainingOptions {
   std::string kdtree_target = "rms", kdtree_split = "best";
   // Of both flows, and of spline and grid; what is not given is the family's own default.
   std::optional<int> couplings, width, blocks, encoding_bins, batch, max_steps, bins;
-  std::optional<double> rate;
+  std::optional<double> rate, jitter;
 
   /// Throws ConfigError for a choice that has no such name.
   TrainSettings train_settings(std::uint64_t seed) const;
