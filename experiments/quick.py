@@ -88,7 +88,7 @@ def billiards():
     dims = (FILM_4D, "film+time")
     methods = ["none", *(f"{family}:{d}" for d in dims for family in ("uniform", "kdtree"))]
     results = compare("quick/billiards", scene, methods, **film, **measure, examples=30000)
-    network = compare("quick/billiards-realnvp", scene, [f"realnvp:{FILM_4D}"], **film, **measure, examples=60000, **NETWORK)
+    network = compare("quick/billiards-realnvp", scene, [f"realnvp:{FILM_4D}"], **film, **measure, examples=60000, max_steps=250)
     for d in dims:
         yield f"billiards: kdtree {d} beats uniform", over(results, f"kdtree:{d}", f"uniform:{d}")
         yield f"billiards: kdtree {d} beats none", over(results, f"kdtree:{d}", "none")
@@ -98,7 +98,7 @@ def billiards():
 def gallery():
     """93 lights: learned choices of light beat choosing at random."""
     scene, film = own_scene("gallery"), {"size": "64x36", "max_depth": 2}
-    measure = {"runs": SEEDS, "spp": 256, **render_reference("quick/gallery", scene, 2048, f"kdtree:{LIGHT}", examples=80000, **film)}
+    measure = {"runs": SEEDS, "spp": 512, **render_reference("quick/gallery", scene, 4096, f"kdtree:{LIGHT}", examples=80000, **film)}
     methods = [f"{family}:{LIGHT}" for family in ("uniform", "kdtree", "realnvp")]
     results = compare("quick/gallery", scene, methods, **film, **measure, examples=30000, **NETWORK)
     yield "gallery: kdtree's choice of light beats uniform in relMSE", over(results, methods[1], methods[0], "relmse_raw")
