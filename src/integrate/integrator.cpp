@@ -106,7 +106,7 @@ struct Integrator::State {
   }
 
   double to_unit(std::size_t d, double x) const {
-    return std::clamp((x - bounds[d].low) / (bounds[d].high - bounds[d].low), 0.0, std::nextafter(1.0, 0.0));
+    return std::clamp((x - bounds[d].low) / (bounds[d].high - bounds[d].low), 0.0, 1 - 0x1p-53);
   }
 };
 

@@ -203,8 +203,14 @@ void Learner::learn_flow(Examples examples, bool tempered) {
   if (m_family == "realnvp") return train(RealNvpSettings(), fit_realnvp);
   SplineSettings settings;
   settings.masks = SplineSettings::Masks::autoregressive;
-  settings.couplings = m_dims <= 3 ? 3 : 1;
-  settings.encoding_bins = m_dims <= 3 ? 32 : 8;
+  if (m_dims <= 3) {  // several passes over few numbers, finely encoded, each by a small network
+    settings.couplings = 3;
+    settings.blocks = 0;
+    settings.encoding_bins = 31;  // with the number itself 32 inputs, which fill the kernels
+  } else {
+    settings.couplings = 1;
+    settings.encoding_bins = 8;
+  }
   train(settings, fit_spline);
 }
 

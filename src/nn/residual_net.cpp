@@ -13,7 +13,8 @@ namespace warpath::nn {
 ResidualNet::ResidualNet(int inputs, int width, int blocks, int outputs, Norm norm) : m_width(width), m_norm(norm) {
   if (width < 16 || width % 16 != 0) throw ConfigError(fmt::format("width {}: must be a multiple of 16", width));
   if (blocks < 0) throw ConfigError(fmt::format("blocks {}: must not be negative", blocks));
-  const int hidden = 1 + 2 * blocks;
+  // Constants need no more than a bias.
+  const int hidden = inputs == 0 && norm == Norm::none ? 0 : 1 + 2 * blocks;
   for (int l = 0; l <= hidden; ++l) {
     DenseLayer layer;
     layer.inputs = l == 0 ? inputs : width;
@@ -104,6 +105,7 @@ void ResidualNet::forward(const float* packed, const float* x, float* activation
   const auto layer = [&](Epilogue epilogue, std::size_t l, const float* from, float* to, const float* skip) {
     dense(epilogue, m_layers[l].inputs, m_layers[l].outputs, packed + m_layers[l].packed, from, to, skip);
   };
+  if (m_layers.size() == 1) return layer(Epilogue::linear, 0, x, out, nullptr);
   layer(Epilogue::relu, 0, x, h, nullptr);
   for (std::size_t l = 1; l + 2 < m_layers.size(); l += 2, h += 2 * size) {
     layer(Epilogue::relu, l, h, h + size, nullptr);
@@ -117,6 +119,7 @@ void ResidualNet::infer(const float* packed, const float* x, float* scratch, flo
   const auto layer = [&](Epilogue epilogue, std::size_t l, const float* from, float* to, const float* skip) {
     dense(epilogue, m_layers[l].inputs, m_layers[l].outputs, packed + m_layers[l].packed, from, to, skip);
   };
+  if (m_layers.size() == 1) return layer(Epilogue::linear, 0, x, out, nullptr);
   layer(Epilogue::relu, 0, x, h, nullptr);
   for (std::size_t l = 1; l + 2 < m_layers.size(); l += 2) {
     layer(Epilogue::relu, l, h, a, nullptr);
@@ -140,6 +143,7 @@ void ResidualNet::backward(const float* packed_back, const float* xt, const floa
     const DenseLayer& layer = m_layers[l];
     dense(epilogue, layer.outputs, layer.inputs, packed_back + layer.packed_back, g, to, skip, act);
   };
+  if (last == 0) return weights(0, d_out, xt);
   // h is the activation below layer l, g_h the gradient before the ReLU that made it.
   const float* h = activations + (last - 1) * size;
   transpose(m_width, h, transposed);

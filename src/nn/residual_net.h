@@ -33,14 +33,15 @@ struct DenseLayer {
 class ResidualNet {
  public:
   ResidualNet() = default;
-  /// width is a multiple of 16; inputs may be 0: then the outputs are constants that are learned.
+  /// width is a multiple of 16. Without inputs the outputs are constants that are learned: a bias, and no hidden layers
+  /// unless they are normalised.
   ResidualNet(int inputs, int width, int blocks, int outputs, Norm norm);
 
   int inputs() const { return m_layers.front().inputs; }
   int outputs() const { return m_layers.back().outputs; }
   int width() const { return m_width; }
   Norm norm() const { return m_norm; }
-  const std::vector<DenseLayer>& layers() const { return m_layers; }  ///< in, then pairs, then out
+  const std::vector<DenseLayer>& layers() const { return m_layers; }  ///< in, then pairs, then out; or out alone
   std::size_t parameter_count() const { return m_parameters; }        ///< padding included; a multiple of 16
   std::size_t packed_count() const { return m_packed; }
   std::size_t packed_back_count() const { return m_packed_back; }

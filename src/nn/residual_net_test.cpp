@@ -33,6 +33,7 @@ Doubles reference(const ResidualNet& net, const Doubles& p, const Doubles& x) {
     for (double& e : v) e = std::max(e, 0.0);
     return v;
   };
+  if (net.layers().size() == 1) return layer(net.layers()[0], p, x);
   Doubles h = relu(layer(net.layers()[0], p, x));
   for (std::size_t l = 1; l + 2 < net.layers().size(); l += 2) {
     Doubles sum = layer(net.layers()[l + 1], p, relu(layer(net.layers()[l], p, h)));
@@ -210,6 +211,7 @@ TEST(ResidualNet, Settings) {
   EXPECT_THROW(ResidualNet(2, 20, 1, 2, Norm::none), ConfigError);
   EXPECT_THROW(ResidualNet(2, 16, -1, 2, Norm::none), ConfigError);
   EXPECT_EQ(ResidualNet(2, 64, 1, 2, Norm::none).multiply_adds(), 2u * 64 + 2 * 64 * 64 + 64 * 2);
+  EXPECT_EQ(ResidualNet(0, 64, 1, 25, Norm::none).layers().size(), 1u) << "of constants a bias alone is trained";
 }
 
 }  // namespace

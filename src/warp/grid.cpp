@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kGuideCells = 4;  // for each interval
 
-/// The largest double below a positive x: what falls into an interval stays below its upper edge.
-double below(double x) { return std::nextafter(x, 0.0); }
+/// x, or the largest double below a positive `edge`: what falls into an interval stays below its upper edge.
+double below(double x, double edge) { return x < edge ? x : std::nextafter(edge, 0.0); }
 
 Matrix<double> identity_edges(int dims, int bins) {
   WARPATH_CHECK(dims >= 1 && bins >= 1);
@@ -73,7 +73,7 @@ void Grid::forward(Batch<const double> z, Batch<double> y, std::span<double> log
       const double scaled = z(i, d) * static_cast<double>(bins);
       const std::size_t bin = std::min(static_cast<std::size_t>(scaled), bins - 1);
       const double low = m_edges(d, bin), high = m_edges(d, bin + 1);
-      y(i, d) = std::clamp(low + (scaled - static_cast<double>(bin)) * (high - low), low, below(high));
+      y(i, d) = below(std::max(low + (scaled - static_cast<double>(bin)) * (high - low), low), high);
       log_slopes += m_log_slope(d, bin);
     }
     log_det[i] = log_slopes;
@@ -89,7 +89,7 @@ void Grid::inverse(Batch<const double> y, Batch<double> z, std::span<double> log
       const std::size_t bin = bin_of(d, y(i, d));
       const double low = m_edges(d, bin), high = m_edges(d, bin + 1);
       const double scaled = static_cast<double>(bin) + (y(i, d) - low) / (high - low);
-      z(i, d) = std::min(scaled / bins, below(static_cast<double>(bin + 1) / bins));
+      z(i, d) = below(scaled / bins, static_cast<double>(bin + 1) / bins);
       log_slopes += m_log_slope(d, bin);
     }
     log_det[i] = -log_slopes;

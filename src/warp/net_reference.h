@@ -26,6 +26,7 @@ inline std::vector<double> reference_net(const nn::ResidualNet& net, const std::
     return v;
   };
   const auto& l = net.layers();
+  if (l.size() == 1) return layer(l[0], x);
   std::vector<double> h = relu(layer(l[0], x));
   for (std::size_t i = 1; i + 2 < l.size(); i += 2) {
     std::vector<double> sum = layer(l[i + 1], relu(layer(l[i], h)));

@@ -57,8 +57,13 @@ Flow::Flow(int dims, const SplineSettings& settings) : m_dims(dims), m_settings(
   if (settings.encoding_bins < 0)
     throw ConfigError(fmt::format("encoding bins {}: must not be negative", settings.encoding_bins));
   WARPATH_CHECK(dims >= 1);
-  for (Split& split : splits(dims, settings)) {
+  std::vector<Split> all = splits(dims, settings);
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    Split& split = all[c];
     Coupling coupling;
+    for (std::size_t before = c + 1; before < all.size(); ++before)
+      coupling.sees_moved |= std::find_first_of(split.kept.begin(), split.kept.end(), all[before].moved.begin(),
+                                                all[before].moved.end()) != split.kept.end();
     coupling.kept = std::move(split.kept);
     coupling.moved = std::move(split.moved);
     // A single dimension has nothing to be conditioned on: its network has no inputs.
@@ -230,8 +235,9 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
     encode_kept(coupling, now, x);
     nn::transpose(coupling.net.inputs(), x, xt);
     coupling.net.backward(packed.back.data() + coupling.packed_back, xt, activations + coupling.activations, d_heads,
-                          gradients + coupling.parameters, accumulate, d_x, false, rest);
-    for (std::size_t k = 0; k < coupling.kept.size(); ++k)
+                          gradients + coupling.parameters, accumulate, coupling.sees_moved ? d_x : nullptr, false,
+                          rest);
+    for (std::size_t k = 0; coupling.sees_moved && k < coupling.kept.size(); ++k)
       encode_backward(m_settings.encoding_bins, row(now, coupling.kept[k]), row(d_x, static_cast<int>(k) * encoded),
                       row(d_v, coupling.kept[k]));
   }

@@ -9,6 +9,7 @@ namespace warpath::spline {
 /// its outputs for each.
 struct Coupling {
   std::vector<int> kept, moved;
+  bool sees_moved = false;  ///< whether y reaches it with kept dimensions that others moved: then gradients go on
   nn::ResidualNet net;
   std::size_t parameters, packed, packed_back, activations;  ///< place of the net's numbers in the flow's arrays
 };
