@@ -26,16 +26,16 @@ def timed(action):
     return result, time.process_time() - start
 
 
-def warpath(task, seed):
+def warpath(task, seed, neval=NEVAL):
     import warpath
 
     integrator = warpath.Integrator([(0, 1)] * task.dims, seed=seed)
-    adaptation, adapt = timed(lambda: integrator(task.f, nitn=NITN, neval=NEVAL))
-    result, measure = timed(lambda: integrator(task.f, nitn=NITN, neval=NEVAL, adapt=False))
+    adaptation, adapt = timed(lambda: integrator(task.f, nitn=NITN, neval=neval))
+    result, measure = timed(lambda: integrator(task.f, nitn=NITN, neval=neval, adapt=False))
     return Outcome(result.mean, result.sdev, result.sum_neval, adapt, measure, sum(i.trained for i in adaptation.itn_results))
 
 
-def vegas(task, seed, stratified=True, neval=NEVAL):
+def vegas(task, seed, neval=NEVAL, stratified=True):
     import gvar
     import vegas
 
@@ -50,18 +50,24 @@ def vegas(task, seed, stratified=True, neval=NEVAL):
 
 
 def vegas_map(task, seed, neval=NEVAL):
-    return vegas(task, seed, stratified=False, neval=neval)
+    return vegas(task, seed, neval, stratified=False)
 
 
 def madnis(task, seed, neval=NEVAL):
-    """MadNIS with its defaults: training by fresh samples, 1,024 a step, as many in all as the others adapt with."""
+    """MadNIS as it did best here: fresh samples, 1,024 a step, as many in all as the others adapt with, and a step size that falls
+    from 0.02 to 0 along a cosine. With its default, 0.001 all the way, errors are 2 to 3 times larger."""
     import torch
     from madnis.integrator import Integrator
 
     torch.manual_seed(seed)
     torch.set_num_threads(1)
-    integrator = Integrator(lambda x: torch.from_numpy(task.f(x.detach().numpy())).to(x.dtype), dims=task.dims)
     steps = NITN * neval // 1024
+    integrator = Integrator(
+        lambda x: torch.from_numpy(task.f(x.detach().numpy())).to(x.dtype),
+        dims=task.dims,
+        learning_rate=2e-2,
+        scheduler=lambda optimiser: torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps),
+    )
     _, adapt = timed(lambda: integrator.train(steps))
     with torch.no_grad():
         (mean, sdev), measure = timed(lambda: integrator.integrate(NITN * neval))

@@ -35,6 +35,9 @@ constexpr double kWorse = 4;          // iterations with so much larger a varian
 constexpr int kEpochs = 4;
 // A grid that leaves this share of effective samples is good enough: scrambled points do the rest.
 constexpr double kGoodGrid = 0.75;
+// Intervals are halved where an average one has so many effective samples, as far as they go.
+constexpr double kEnoughOfBin = 200;
+constexpr int kMostGridBins = 512;
 constexpr std::size_t kMostGridNumbers = std::size_t{1} << 24;  // coordinates that a grid learns from
 constexpr double kFlowGain = 1.01;  // in effective samples from one iteration to the next, to train a flow on
 constexpr int kFlowTries = 3;       // times that a flow may be trained without beating the grid
@@ -176,6 +179,9 @@ void Learner::learn_grid(const Examples& examples, bool tempered) {
   GridSettings settings;
   settings.iterations = tempered ? 3 : 5;
   if (tempered) settings.target = GridSettings::Target::mean;
+  const double effective = effective_samples(examples.weight);
+  while (2 * m_grid->bins() <= kMostGridBins && 2 * m_grid->bins() * kEnoughOfBin <= effective)
+    m_grid = std::make_shared<const Grid>(halved(*m_grid));
   m_grid = fit_grid(examples, settings, m_grid.get());
 }
 

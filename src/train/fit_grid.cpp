@@ -127,4 +127,13 @@ std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSetting
   return best;
 }
 
+Grid halved(const Grid& grid) {
+  const Matrix<double>& edges = grid.edges();
+  Matrix<double> half(edges.rows(), 2 * edges.cols() - 1);
+  for (std::size_t d = 0; d < half.rows(); ++d)
+    for (std::size_t k = 0; k < half.cols(); ++k)
+      half(d, k) = k % 2 == 0 ? edges(d, k / 2) : 0.5 * (edges(d, k / 2) + edges(d, k / 2 + 1));
+  return Grid(std::move(half));
+}
+
 }  // namespace warpath

@@ -14,4 +14,7 @@ namespace warpath {
 std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSettings& settings,
                                      const Grid* init = nullptr);
 
+/// The same map with every interval cut in two.
+Grid halved(const Grid& grid);
+
 }  // namespace warpath

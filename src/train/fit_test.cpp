@@ -216,6 +216,22 @@ TEST(FitGrid, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(with_threads(1), with_threads(2));
 }
 
+TEST(FitGrid, HalvedIsTheSameMapAndFollowsMoreClosely) {
+  const auto coarse = fit_grid(examples_of(bump(2), 200'000), {});
+  const Grid fine = halved(*coarse);
+  ASSERT_EQ(fine.bins(), 2 * coarse->bins());
+  Matrix<double> z(1000, 2), of_coarse(1000, 2), of_fine(1000, 2);
+  for (std::size_t k = 0; k < z.values().size(); ++k) z.values()[k] = sample_double(5, static_cast<std::uint32_t>(k));
+  std::vector<double> log_coarse(1000), log_fine(1000);
+  coarse->forward(z.batch(), of_coarse.batch(), log_coarse);
+  fine.forward(z.batch(), of_fine.batch(), log_fine);
+  for (std::size_t k = 0; k < z.values().size(); ++k)
+    EXPECT_NEAR(of_fine.values()[k], of_coarse.values()[k], 1e-12) << k;
+  for (std::size_t k = 0; k < 1000; ++k) EXPECT_NEAR(log_fine[k], log_coarse[k], 1e-9) << k;
+  const auto finer = fit_grid(examples_of(bump(2), 200'000), {}, &fine);
+  EXPECT_LT(second_moment(bump(2), *finer) - 1, 0.5 * (second_moment(bump(2), *coarse) - 1));
+}
+
 TEST(FitGrid, CanStartFromAMap) {
   const Examples examples = examples_of(bump(2), 50'000);
   GridSettings settings;
