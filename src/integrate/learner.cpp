@@ -39,8 +39,11 @@ constexpr double kGoodGrid = 0.75;
 constexpr double kEnoughOfBin = 200;
 constexpr int kMostGridBins = 512;
 constexpr std::size_t kMostGridNumbers = std::size_t{1} << 24;  // coordinates that a grid learns from
-constexpr double kFlowGain = 1.01;  // in effective samples from one iteration to the next, to train a flow on
-constexpr int kFlowTries = 3;       // times that a flow may be trained without beating the grid
+constexpr double kAnnealingGain = 2;  // in tempered effective samples, for a grid to go on annealing by itself
+constexpr double kFlowGain = 1.01;    // in effective samples from one iteration to the next, to train a flow on
+constexpr int kFlowTries = 3;         // times that a flow may be trained without beating the grid
+
+double enough_of(double examples) { return std::min(kEnough, kEnoughShare * examples); }
 
 bool is_flow(const std::string& family) { return family == "spline" || family == "realnvp" || family == kGridSpline; }
 
@@ -114,11 +117,11 @@ void Learner::learn(Examples examples, double variance) {
   if (effective == 0) return;  // nothing was seen; what there is draws again
   ++m_learned;
   const double count = static_cast<double>(examples.size()), share = effective / count;
-  if (m_family == "auto" || m_family == kGridSpline) m_grid_done = grid_is_done(share);
+  if (m_family == "auto" || m_family == kGridSpline) m_grid_done = grid_is_done(examples, share);
   const bool trained = m_flows > 0 && defended() && share < kFlowGain * m_passes.back().effective_share;
   remember(std::move(examples), share);
 
-  const double enough = std::min(kEnough, kEnoughShare * count);
+  const double enough = enough_of(count);
   const bool annealing = effective < enough;
   if (trained && !annealing) return;
   const bool of_grid = m_grid && !m_grid_done;
@@ -141,12 +144,18 @@ void Learner::remember(Examples examples, double effective_share) {
 }
 
 // A grid has done what it can when an iteration that it drew is hardly better than the one before.
-bool Learner::grid_is_done(double effective_share) const {
+bool Learner::grid_is_done(const Examples& examples, double effective_share) const {
   if (m_dims > kMostFlowDims) return false;
   if (m_grid_done || m_passes.empty()) return m_grid_done;
   if (effective_share > kGoodGrid) return m_family == kGridSpline;
-  const double gain = effective_share / m_passes.back().effective_share;
-  return gain < (effective_share < 0.1 ? 4.0 : 1.3);
+  const Pass& last = m_passes.back();
+  const double count = static_cast<double>(last.examples.size()), enough = enough_of(count);
+  if (last.effective_share * count >= enough)
+    return effective_share / last.effective_share < (effective_share < 0.1 ? 4.0 : 1.3);
+  // How many of a handful of samples are effective is chance; of weights tempered as the grid was taught it is not.
+  const double b = tempering(last.examples.weight, enough);
+  const double now = effective_samples(examples.weight, b) / static_cast<double>(examples.size());
+  return now < kAnnealingGain * enough / count;
 }
 
 Examples Learner::pooled(std::size_t most) const {

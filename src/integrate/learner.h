@@ -44,7 +44,7 @@ class Learner {
     double effective_share;  ///< of its points: effective samples among them
   };
   void remember(Examples examples, double effective_share);
-  bool grid_is_done(double effective_share) const;
+  bool grid_is_done(const Examples& examples, double effective_share) const;
   /// Of the iterations that were drawn about as well as the best one, row by row in turn, `most` rows at most.
   Examples pooled(std::size_t most) const;
   void learn_grid(const Examples& examples, bool tempered);

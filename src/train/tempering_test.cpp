@@ -25,6 +25,8 @@ TEST(Tempering, LeavesAsManyEffectiveSamplesAsAsked) {
     EXPECT_NEAR(result.weight[i], i % 10 == 3 ? 0 : std::exp(0.02 * b * static_cast<double>(i)),
                 1e-4 * result.weight[999]);
   EXPECT_EQ(result.inv_q, examples.inv_q);
+  EXPECT_NEAR(tempering(examples.weight, 400), b, 1e-5);
+  EXPECT_NEAR(effective_samples(examples.weight, b), 400, 1);
   // What does not need it stays as it is.
   EXPECT_NEAR(effective_samples(tempered(examples, 10).weight), before, 0.01);
 }
