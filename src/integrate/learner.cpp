@@ -35,8 +35,10 @@ constexpr double kWorse = 4;          // iterations with so much larger a varian
 constexpr int kEpochs = 4;
 // A grid that leaves this share of effective samples is good enough: scrambled points do the rest.
 constexpr double kGoodGrid = 0.75;
-// Intervals are halved where an average one has so many effective samples, as far as they go.
+// Intervals are halved where an average one has so many effective samples, as far as they go; more where there are more
+// dimensions, as the noise of all of them adds up.
 constexpr double kEnoughOfBin = 200;
+constexpr double kDimsOfEnough = 16;
 constexpr int kMostGridBins = 512;
 constexpr std::size_t kMostGridNumbers = std::size_t{1} << 24;  // coordinates that a grid learns from
 constexpr double kAnnealingGain = 2;  // in tempered effective samples, for a grid to go on annealing by itself
@@ -188,8 +190,8 @@ void Learner::learn_grid(const Examples& examples, bool tempered) {
   GridSettings settings;
   settings.iterations = tempered ? 3 : 5;
   if (tempered) settings.target = GridSettings::Target::mean;
-  const double effective = effective_samples(examples.weight);
-  while (2 * m_grid->bins() <= kMostGridBins && 2 * m_grid->bins() * kEnoughOfBin <= effective)
+  const double most = effective_samples(examples.weight) / (kEnoughOfBin * std::max(1.0, m_dims / kDimsOfEnough));
+  while (2 * m_grid->bins() <= std::min<double>(kMostGridBins, most))
     m_grid = std::make_shared<const Grid>(halved(*m_grid));
   m_grid = fit_grid(examples, settings, m_grid.get());
 }
