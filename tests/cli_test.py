@@ -61,7 +61,7 @@ class CommandLine(unittest.TestCase):
         self.fails(2, "render", BOX, "--crop", "0,0,9999,1", "-o", self.path("a.exr"), says=["--crop"])
         self.fails(2, "train", BOX, "--warp", "none", "-o", self.path("a.warp"), says=["nothing to train"])
         self.fails(2, "train", BOX, "--warp", "auto", "-o", self.path("a.warp"), says=["nothing to train"])
-        self.fails(2, "render", BOX, "--warp", "field:film", "-o", self.path("a.exr"), says=["no dimensions to choose"])
+        self.fails(2, "render", BOX, "--warp", "field:film", "-o", self.path("a.exr"), says=["field:film", "light_uv"])
         self.fails(2, "render", BOX, "--warp", "neural:film+bounce1", "-o", self.path("a.exr"), says=["neural:film+bounce1", "light_uv"])
         self.fails(2, "render", BOX, "--warp", "neural:bounce1", "-o", self.path("a.exr"), says=["bounce1.lobe+bounce1.dir"])
         self.fails(2, "render", BOX, "--warp", "field", "--objective", "mape", "-o", self.path("a.exr"), says=["--objective"])
@@ -127,13 +127,14 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("auto: ", result.stderr)
 
-    def test_a_network_is_saved_with_the_numbers_that_it_warps(self):
+    def test_warps_of_vertices_are_saved_with_the_numbers_that_they_warp(self):
         warp, out = self.path("box.warp"), self.path("out.exr")
-        for method, what in (("neural", "every vertex"), ("neural:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir")):
+        for method, what in (("neural", "every vertex"), ("neural:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir"),
+                             ("field:bounce1.light+bounce1.light_uv", "bounce1.light+bounce1.light_uv")):
             result = self.warpath("train", BOX, "--warp", method, "-o", warp, "--examples", 2048, "--batch", 256, *SMALL)
             self.assertEqual(result.returncode, 0, result.stderr)
             told = self.warpath("inspect", warp).stdout
-            for text in ("neural", what, "paths"):
+            for text in (method.split(":")[0], what, "paths"):
                 self.assertIn(text, told)
             for spelled in (warp, method):
                 result = self.warpath("render", BOX, "--warp", spelled, "--spp", 7, "-o", out, *SMALL)

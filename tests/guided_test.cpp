@@ -41,7 +41,9 @@ std::unique_ptr<VertexTrainer> make_trainer(const std::string& family, const Tra
   settings.batch = 256;
   settings.rate = 5e-3;
   settings.min_visits = 4096;
-  if (family == "field") return std::make_unique<FieldTrainer>(settings.field, tracer.emitters());
+  if (family == "field:bounce1") settings.field.numbers = Layout::parse("bounce1.lobe+bounce1");
+  if (family == "field" || family == "field:bounce1")
+    return std::make_unique<FieldTrainer>(settings.field, tracer.emitters());
   if (family == "neural:bounce1") settings.numbers = Layout::parse("bounce1.lobe+bounce1");
   if (family != "none") return std::make_unique<NeuralTrainer>(settings, tracer.emitters(), 1);
   return nullptr;
@@ -111,11 +113,12 @@ const Spread& reference_of_box() {
 
 TEST(Guided, FieldsAndAllocationLeaveEveryPixelsMeanAsItIs) {
   const Tracer& tracer = box_tracer(12, 8);
-  for (const auto objective :
-       {std::optional<Objective>{}, std::optional(Objective::mse), std::optional(Objective::relmse)}) {
+  for (const auto& [objective, family] : {std::pair{std::optional<Objective>{}, "field"},
+                                          {std::optional(Objective::mse), "field:bounce1"},
+                                          {std::optional(Objective::relmse), "field"}}) {
     Spread spread;
     for (std::uint64_t seed = 0; seed < 200; ++seed)
-      spread.add(guided(tracer, {16, 16, 32, 64}, objective, "field", seed));
+      spread.add(guided(tracer, {16, 16, 32, 64}, objective, family, seed));
     expect_same_means(spread, reference_of_box(), 0.01);
   }
 }

@@ -81,6 +81,7 @@ struct FieldSettings {
   double shrink = 48;
   double uniform = 0.4;  ///< share of uniform numbers until cells have found out which one is best for them
   double trust = 1;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
+  Layout numbers;    ///< that are warped: bounce1.lobe+bounce1.dir, ...; empty: those of every vertex
 };
 
 /// Size of the network that corrects a field.

@@ -49,7 +49,7 @@ Method parse_method(const std::string& text) {
                                     text.substr(colon + 1)));
     return method;
   }
-  if (method.family == "neural") {
+  if (method.family == "field" || method.family == "neural") {
     if (colon != std::string::npos) method.layout = Layout::parse(std::string_view(text).substr(colon + 1));
     try {
       check_vertex_numbers(method.layout);
@@ -58,10 +58,8 @@ Method parse_method(const std::string& text) {
     }
     return method;
   }
-  if (method.family == "field" || method.family == "auto") {
-    if (colon != std::string::npos)
-      throw ConfigError(fmt::format("\"{}\": {} warps the numbers of every vertex; it has no dimensions to choose",
-                                    text, method.family));
+  if (method.family == "auto") {
+    if (colon != std::string::npos) throw ConfigError(fmt::format("\"{}\": auto has no dimensions to choose", text));
     return method;
   }
   method.layout =
@@ -158,7 +156,9 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     return prepared;
   }
   if (method.family == "field" || method.family == "auto") {
-    auto trainer = std::make_unique<FieldTrainer>(m_settings.field, m_tracer->emitters());
+    FieldSettings settings = m_settings.field;
+    settings.numbers = method.layout;
+    auto trainer = std::make_unique<FieldTrainer>(settings, m_tracer->emitters());
     if (!m_init.empty()) {
       const auto field = std::dynamic_pointer_cast<const Field>(load_warp(m_init).vertex_warp);
       if (!field)

@@ -18,7 +18,7 @@ namespace warpath {
 struct Method {
   std::string name;            ///< as typed
   std::string family;          ///< `none`, `uniform`, `grid`, ...
-  Layout layout;               ///< empty for `none`, and for `field`, which warps the numbers of every vertex
+  Layout layout;               ///< empty for `none`, and where the numbers of every vertex are warped
   std::filesystem::path file;  ///< of a trained warp; empty if it is trained now
 };
 /// Throws ConfigError that lists the families, or FileError if a warp file cannot be read.

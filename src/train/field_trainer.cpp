@@ -51,11 +51,14 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree,
            std::shared_ptr<const Field> field)
       : m_squared(settings.target == FieldSettings::Target::second_moment),
+        m_numbers(settings.numbers),
         m_grids(grids),
         m_tree(std::move(tree)),
         m_field(std::move(field)) {}
 
   void record(const VertexRecords& records) override {
+    const auto holds = [&](VertexNumbers which) { return holds_vertex_numbers(m_numbers, which, records.bounce); };
+    if (!holds(VertexNumbers::light) && !holds(VertexNumbers::scatter)) return;
     const auto& u = records.numbers;
     const auto finite = [](float term) { return std::isfinite(term) ? term : 0.0f; };
     const std::size_t n = records.lanes.size();
@@ -100,6 +103,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
 
  private:
   const bool m_squared;
+  const Layout& m_numbers;
   const FieldGrids& m_grids;
   const std::shared_ptr<const FieldTree> m_tree;
   const std::shared_ptr<const Field> m_field;
@@ -109,7 +113,9 @@ class FieldTrainer::Recorder final : public VertexRecorder {
 };
 
 FieldTrainer::FieldTrainer(const FieldSettings& settings, int light_parts)
-    : m_settings(settings), m_grids(light_parts) {}
+    : m_settings(settings), m_grids(light_parts) {
+  check_vertex_numbers(settings.numbers);
+}
 
 void FieldTrainer::start_from(const Field& field) {
   if (field.grids().light_parts != m_grids.light_parts)
@@ -376,7 +382,7 @@ std::shared_ptr<const Field> FieldTrainer::fit() {
     returns.push_back({told(cell.light), told(cell.scatter)});
   }
   return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter),
-                                 std::move(returns));
+                                 std::move(returns), m_settings.numbers);
 }
 
 }  // namespace warpath

@@ -36,13 +36,14 @@ FieldGrids::FieldGrids(int parts)
       delta({4, 2, 2}) {}
 
 Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-             std::vector<CumulativeProbability> scatter, std::vector<Returns> returns)
+             std::vector<CumulativeProbability> scatter, std::vector<Returns> returns, Layout numbers)
     : m_tree(std::move(tree)),
       m_grids(std::move(grids)),
       m_kinds(std::move(kinds)),
       m_light(std::move(light)),
       m_scatter(std::move(scatter)),
-      m_returns(std::move(returns)) {
+      m_returns(std::move(returns)),
+      m_numbers(std::move(numbers)) {
   WARPATH_CHECK_EQ(m_kinds.size(), m_tree.cells());
   WARPATH_CHECK_EQ(m_returns.size(), m_tree.cells());
   WARPATH_CHECK_EQ(m_light.size(), m_tree.cells() * m_grids.light.stored());
@@ -115,6 +116,7 @@ bool Field::expect_return(const std::uint32_t* places, std::size_t n, const floa
 
 void Field::save(TensorFile& file, const std::string& prefix) const {
   file.metadata()[prefix + "family"] = family();
+  file.metadata()[prefix + "numbers"] = m_numbers.name();
   file.metadata()[prefix + "light_parts"] = std::to_string(m_grids.light_parts);
   const FieldTree::Flat flat = m_tree.flat();
   const auto size = [](const auto& values) { return static_cast<std::int64_t>(values.size()); };
@@ -182,7 +184,7 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
         fail_load(file, prefix, "what returns to a cell is not a sensible number");
   }
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
-                                 std::move(scatter), std::move(returns));
+                                 std::move(scatter), std::move(returns), load_vertex_numbers(file, prefix));
 }
 
 }  // namespace warpath

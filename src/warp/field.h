@@ -4,7 +4,7 @@
 
 #include "warp/field_tree.h"
 #include "warp/halving_density.h"
-#include "warp/vertex_warp.h"
+#include "warp/vertex_numbers.h"
 
 namespace warpath {
 
@@ -23,7 +23,8 @@ struct FieldGrids {
 };
 
 /// A field of densities in world space: a FieldTree whose cells each hold a piecewise-constant density over the numbers
-/// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers.
+/// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers. Of one vertex alone
+/// it is a warp conditioned on what the path knows there: of the first, on what the film shows.
 class Field final : public VertexWarp {
  public:
   /// What comes back to a vertex of a cell, by light sampling or through the direction that is scattered into.
@@ -34,11 +35,16 @@ class Field final : public VertexWarp {
   struct Returns {
     Return light, scatter;
   };
-  /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers.
+  /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers. numbers: those
+  /// that it draws, see check_vertex_numbers; empty for those of every vertex.
   Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
-        std::vector<CumulativeProbability> scatter, std::vector<Returns> returns);
+        std::vector<CumulativeProbability> scatter, std::vector<Returns> returns, Layout numbers = {});
 
   std::string family() const override { return "field"; }
+  bool warps(VertexNumbers which, std::uint16_t bounce) const override {
+    return holds_vertex_numbers(m_numbers, which, bounce);
+  }
+  const Layout& numbers() const { return m_numbers; }
   /// A place is a cell.
   void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;
   void sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
@@ -66,6 +72,7 @@ class Field final : public VertexWarp {
   std::vector<SurfaceKind> m_kinds;  // of each cell
   std::vector<CumulativeProbability> m_light, m_scatter;
   std::vector<Returns> m_returns;
+  Layout m_numbers;
 };
 
 }  // namespace warpath

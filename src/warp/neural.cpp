@@ -29,27 +29,6 @@ struct Place {
 
 }  // namespace
 
-void check_vertex_numbers(const Layout& numbers) {
-  for (const Group group : numbers.groups()) {
-    const bool of_light = group.kind == GroupKind::light || group.kind == GroupKind::light_uv;
-    if (!of_light && group.kind != GroupKind::lobe && group.kind != GroupKind::dir)
-      throw ConfigError(
-          fmt::format("{} is not a number that a warp of vertices draws; those are light, light_uv, lobe "
-                      "and dir of a bounce",
-                      group.name()));
-    const Group first{of_light ? GroupKind::light : GroupKind::lobe, group.bounce};
-    const Group second{of_light ? GroupKind::light_uv : GroupKind::dir, group.bounce};
-    if (!numbers.contains(first) || !numbers.contains(second))
-      throw ConfigError(
-          fmt::format("{} is drawn as one with its other half: name {}+{}", group.name(), first.name(), second.name()));
-  }
-}
-
-bool holds_vertex_numbers(const Layout& numbers, VertexNumbers which, std::uint16_t bounce) {
-  return numbers.dims() == 0 ||
-         numbers.contains({which == VertexNumbers::light ? GroupKind::light : GroupKind::lobe, bounce});
-}
-
 Neural::Neural(std::shared_ptr<const Field> field, std::shared_ptr<const VertexNetwork> network, const VertexBox& box,
                nn::AlignedVector<float> parameters, Layout numbers)
     : m_field(std::move(field)),
@@ -153,15 +132,7 @@ std::shared_ptr<const Neural> Neural::load(const TensorFile& file, const std::st
   shape.position_bins = load_int(file, prefix, "position_bins", 0, 256);
   if (shape.width % 16 != 0) fail_load(file, prefix, fmt::format("width {}: not a multiple of 16", shape.width));
   auto network = std::make_shared<const VertexNetwork>(field->grids().light_parts, shape);
-  Layout numbers;
-  if (const std::string& text = file.meta(prefix + "numbers"); !text.empty()) {
-    try {
-      numbers = Layout::parse(text);
-      check_vertex_numbers(numbers);
-    } catch (const ConfigError& error) {
-      fail_load(file, prefix, error.what());
-    }
-  }
+  Layout numbers = load_vertex_numbers(file, prefix);
   const std::vector<float> box = file.get<float>(prefix + "box").values;
   const std::vector<float> stored = file.get<float>(prefix + "network").values;
   if (box.size() != 4 || stored.size() != network->parameter_count())

@@ -2,15 +2,9 @@
 #include <memory>
 
 #include "warp/vertex_network.h"
-#include "warpath/layout.h"
+#include "warp/vertex_numbers.h"
 
 namespace warpath {
-
-/// Throws ConfigError unless the groups are those that a warp of vertices draws together:
-/// bounceK.light+bounceK.light_uv, bounceK.lobe+bounceK.dir.
-void check_vertex_numbers(const Layout& numbers);
-/// Whether they hold those of a vertex; empty stands for all.
-bool holds_vertex_numbers(const Layout& numbers, VertexNumbers which, std::uint16_t bounce);
 
 /// A field of densities in world space that a small network corrects by what the path knows at each vertex: see
 /// VertexNetwork. The field tells places apart, the network carries over what many of them have in common, and what

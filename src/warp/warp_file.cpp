@@ -46,7 +46,9 @@ WarpFile load_warp(const std::filesystem::path& path) {
         fmt::format("{}: format \"{}\"; this version of warpath reads \"{}\"", path.string(), format, kFormat));
   WarpFile file;
   if (const std::string& family = tensors.meta(kPrefix + "family"); family == "field") {
-    file.vertex_warp = Field::load(tensors, kPrefix);
+    const auto field = Field::load(tensors, kPrefix);
+    file.vertex_warp = field;
+    file.layout = field->numbers();
   } else if (family == "neural") {
     const auto neural = Neural::load(tensors, kPrefix);
     file.vertex_warp = neural;

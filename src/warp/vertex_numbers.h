@@ -1,0 +1,18 @@
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "warp/vertex_warp.h"
+#include "warpath/layout.h"
+
+namespace warpath {
+
+/// Throws ConfigError unless the groups are those that a warp of vertices draws together:
+/// bounceK.light+bounceK.light_uv, bounceK.lobe+bounceK.dir.
+void check_vertex_numbers(const Layout& numbers);
+/// Whether they hold those of a vertex; empty stands for all.
+bool holds_vertex_numbers(const Layout& numbers, VertexNumbers which, std::uint16_t bounce);
+/// Those of a saved warp, under "numbers". Throws FileError.
+Layout load_vertex_numbers(const TensorFile& file, const std::string& prefix);
+
+}  // namespace warpath
