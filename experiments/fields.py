@@ -2,7 +2,7 @@
 
 from curves import error_charts
 from shared_scenes import BOTH, reference
-from tables import comparison_table, write_table
+from tables import comparison_table, rows_of, write_table
 from tool import compare, folder_of, own_scene, render_reference, shared_scene, train
 
 
@@ -12,7 +12,7 @@ def field_at(label, methods, **options):
         for objective in ("mse", "relmse"):
             place = f"{label}/{name}-{objective}"
             results = compare(place, shared_scene(name), methods, size="320x180", max_depth=8, runs=3, objective=objective,
-                              **options, **reference(name))  # fmt: skip
+                              sampler="sobol", **options, **reference(name))  # fmt: skip
             write_table(folder_of(place), comparison_table(results))
             error_charts(folder_of(place), results)
 
@@ -24,18 +24,18 @@ def field_samples():
 
 
 def field_time():
-    """The field and auto at equal time, everything included."""
-    for seconds in (30, 60):
-        field_at(f"field-{seconds}s", ["none", "field", "auto"], time=seconds)
+    """The field for a minute and auto for half of one, against plain path tracing at equal time, everything included; 128 and 512 spp are on the way."""
+    field_at("field-60s", ["none", "field"], time=60)
+    field_at("auto-30s", ["none", "auto"], time=30)
 
 
 def door_ajar():
     """Light that comes through a door left ajar, at equal time, against a field's long reference."""
     scene, size = own_scene("ajar"), {"size": "160x90"}
-    against = render_reference("door-ajar", scene, 8192, objective="relmse", **size)
+    against = render_reference("door-ajar", scene, 4096, objective="relmse", **size)
     for objective in ("mse", "relmse"):
         label = f"door-ajar/{objective}"
-        results = compare(label, scene, ["none", "field", "auto"], **size, time=10, runs=5, objective=objective, **against)
+        results = compare(label, scene, ["none", "field", "auto"], **size, time=10, runs=3, objective=objective, **against)
         write_table(folder_of(label), comparison_table(results))
 
 
@@ -50,4 +50,33 @@ def views():
         write_table(folder_of(label), comparison_table(results))
 
 
-ALL = (field_samples, field_time, door_ajar, views)
+FIRST_HIT = "bounce1.lobe+bounce1"
+
+
+def ablation():
+    """What each part brings at 64 spp: conditioning, later vertices, light choice, loss, lobe, Sobol' points, allocation, what passes teach."""
+    for name in BOTH:
+        place, scene = f"ablation/{name}", shared_scene(name)
+        fixed = {"size": "320x180", "max_depth": 8, "spp": 64, "runs": 3, **reference(name)}
+        base = compare(f"{place}/base", scene, ["none", "field", "neural"], **fixed, objective="relmse")
+        table = comparison_table(base)
+
+        def add(label, methods, **options):
+            table.extend(rows_of(compare(f"{place}/{label}", scene, methods, **{**fixed, **options}), base, label))
+
+        # The first hit's direction: one density for all pixels, one for each place, and one by a network.
+        add("first-hit", [f"spline:{FIRST_HIT}", f"field:{FIRST_HIT}", f"neural:{FIRST_HIT}"], objective="relmse")
+        add("light-of-first-hit", ["field:bounce1.light+bounce1.light_uv"], objective="relmse")
+        add("even-allocation", ["field"], objective="even")
+        add("mse-allocation", ["field"], objective="mse")
+        add("sobol", ["none", "field"], objective="relmse", sampler="sobol")
+        # Trained beforehand on as many paths, which do not count.
+        warp, _, _ = train(place, scene, "field", size="320x180", max_depth=8, examples=64 * 320 * 180 // 8)
+        add("passes-do-not-count", [warp], objective="relmse")
+        # Joint warps, whose candidates do not count.
+        add("joint", [f"spline:film+{FIRST_HIT}", "spline:film+bounce1"], epp=4)
+        add("joint-likelihood", [f"spline:film+{FIRST_HIT}"], epp=4, loss="likelihood")
+        write_table(folder_of(place), table)
+
+
+ALL = (field_samples, field_time, ablation, door_ajar, views)
