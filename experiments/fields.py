@@ -32,7 +32,7 @@ def field_time():
 def door_ajar():
     """Light that comes through a door left ajar, at equal time, against a field's long reference."""
     scene, size = own_scene("ajar"), {"size": "160x90"}
-    against = render_reference("door-ajar", scene, 4096, objective="relmse", **size)
+    against = render_reference("door-ajar", scene, 2048, objective="relmse", **size)
     for objective in ("mse", "relmse"):
         label = f"door-ajar/{objective}"
         results = compare(label, scene, ["none", "field", "auto"], **size, time=10, runs=3, objective=objective, **against)

@@ -20,7 +20,7 @@ double seconds_since(Clock::time_point then) { return std::chrono::duration<doub
 /// What a path costs with a warp at its vertices, over what one costs without, by count of operations: looking a vertex
 /// up, two densities, what half of the paths teach, and longer paths with more light to look for, against two rays, a
 /// BSDF and a light.
-constexpr double kVertexWarpCost = 1.35;
+constexpr double kVertexWarpCost = 1.85;
 /// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
 constexpr int kTrialSpp = 8;
 /// The warp goes on learning after its first pass: it is given up only if its error times cost is so much worse there.
