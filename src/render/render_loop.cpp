@@ -23,15 +23,20 @@ double seconds_since(Clock::time_point then) { return std::chrono::duration<doub
 constexpr double kVertexWarpCost = 1.85;
 /// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
 constexpr int kTrialSpp = 8;
-/// The warp goes on learning after its first pass: it is given up only if its error times cost is so much worse there.
-/// A later look would not do: deviations of few samples come out too small, so the two passes must be about as long.
-constexpr double kStillLearns = 0.8;
+/// After its first pass, where it knows little yet, the warp is given up only if its error times cost is so much worse;
+/// where light is rare, deviations of few samples come out too small besides.
+constexpr double kStillLearns = 0.3;
+/// The pass before the second look, and how good the warp must be then: the plain pass that it is compared with was
+/// shorter, and looks better than it was.
+constexpr int kSecondLookSpp = 32;
+constexpr double kLearned = 0.5;
 /// The pass that begins here is drawn uniformly and teaches nothing where costs are measured: that is what a path costs
 /// without a warp.
 constexpr int kPlainCostSpp = 2;
 
 /// How `auto` chooses between uniform numbers and the warp at vertices: error of one sample times its cost, of the last
-/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp.
+/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp, and again of one at
+/// kSecondLookSpp.
 class Trial {
  public:
   /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
@@ -52,16 +57,19 @@ class Trial {
     // Passes double, and the last one teaches nothing: half of all paths do.
     const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
     const double gain = m_plain_error / (error * cost);
-    const bool pays = !(gain < kStillLearns);
+    const bool settled = before >= kSecondLookSpp;
+    if (!settled && before > kTrialSpp) return;
+    const bool pays = !(gain < (settled ? kLearned : kStillLearns));
     guide.choice = fmt::format(
-        "{}: error times cost is {:.2f} x less with a field at every vertex, whose paths cost {:.2f} x more",
+        "{}: a field at every vertex has {:.2f} x the efficiency, 1 / (error x cost), and its paths cost {:.2f} x as "
+        "much",
         pays ? "field" : "plain path tracing", gain, cost);
     log::info("auto: {}", guide.choice);
     if (!pays) {
       guide.warp = nullptr;
       guide.trainer = nullptr;
     }
-    guide.automatic = false;
+    if (settled || !pays) guide.automatic = false;
   }
 
  private:
