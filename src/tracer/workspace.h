@@ -75,7 +75,7 @@ struct Workspace {
   std::uint8_t* smooth;
   ContextArrays context;
   DrawnNumbers film, lens, shutter, light, light_uv, lobe, dir, roulette;
-  float* survival;  ///< probability with which the renderer's roulette lets a ray go on
+  float* survival;      ///< probability with which the renderer's roulette lets a ray go on
   std::uint32_t* slot;  ///< its place among the smooth ones
   std::uint32_t* rank;  ///< its place in the order below
 
