@@ -73,8 +73,6 @@ struct KdTreeSettings {
 
 /// Settings of the field, the warp that lives at every vertex and learns while it renders.
 struct FieldSettings {
-  /// Density of a bin ~ mean of what comes back, or its root mean square, which would be best if it were known well.
-  enum class Target { mean, second_moment } target = Target::mean;
   std::uint32_t max_cells = 1 << 15;
   double split_at = 2500;  ///< vertices in a cell after which it is cut in two
   /// A bin is drawn to those around it as if by so many samples of theirs, unless it differs from them for certain.

@@ -42,7 +42,6 @@ class FieldTrainer::Recorder final : public VertexRecorder {
     std::uint32_t root_key, cell;
     std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
     float light, scatter;                  // f / q
-    float light_moment, scatter_moment;
     float inv_q_light, inv_q_scatter;      // of the draw,
     float inv_own_light, inv_own_scatter;  // and of the field
     FieldTree::Features at;
@@ -50,11 +49,7 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   /// field: where draws come from another density; else null.
   Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree,
            std::shared_ptr<const Field> field)
-      : m_squared(settings.target == FieldSettings::Target::second_moment),
-        m_numbers(settings.numbers),
-        m_grids(grids),
-        m_tree(std::move(tree)),
-        m_field(std::move(field)) {}
+      : m_numbers(settings.numbers), m_grids(grids), m_tree(std::move(tree)), m_field(std::move(field)) {}
 
   void record(const VertexRecords& records) override {
     const auto holds = [&](VertexNumbers which) { return holds_vertex_numbers(m_numbers, which, records.bounce); };
@@ -87,10 +82,6 @@ class FieldTrainer::Recorder final : public VertexRecorder {
           static_cast<std::uint16_t>(m_grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]));
       entry.light = finite(records.light[i]);
       entry.scatter = finite(records.beyond[i]);
-      // f / q, or f^2 / q.
-      entry.light_moment = m_squared ? finite(entry.light * entry.light / records.inv_q_light[i]) : entry.light;
-      entry.scatter_moment =
-          m_squared ? finite(entry.scatter * entry.scatter / records.inv_q_scatter[i]) : entry.scatter;
       entry.inv_q_light = records.inv_q_light[i];
       entry.inv_q_scatter = records.inv_q_scatter[i];
       entry.inv_own_light = own_light[i];
@@ -102,7 +93,6 @@ class FieldTrainer::Recorder final : public VertexRecorder {
   std::vector<Entry> entries;
 
  private:
-  const bool m_squared;
   const Layout& m_numbers;
   const FieldGrids& m_grids;
   const std::shared_ptr<const FieldTree> m_tree;
@@ -210,12 +200,12 @@ void FieldTrainer::merge(VertexRecorder& recorder) {
     }
     if (e.light_bin != kNoBin) {
       Bin& bin = m_light[e.cell * light_bins + e.light_bin];
-      bin.moment += e.light_moment;
+      bin.sum += e.light;
       bin.draws += 1;
       cell.light.add(e.light, e.inv_q_light, e.inv_own_light);
     }
     Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
-    bin.moment += e.scatter_moment;
+    bin.sum += e.scatter;
     bin.draws += 1;
     cell.scatter.add(e.scatter, e.inv_q_scatter, e.inv_own_scatter);
   }
@@ -258,7 +248,7 @@ bool FieldTrainer::cut(std::uint32_t index, double extent2) {
     bins.resize(bins.size() + size);
     for (std::size_t b = 0; b < size; ++b) {
       Bin& bin = bins[index * size + b];
-      bin.moment *= 0.5f, bin.draws *= 0.5f;
+      bin.sum *= 0.5f, bin.draws *= 0.5f;
       bins[upper * size + b] = bin;
     }
   };
@@ -311,37 +301,35 @@ double FieldTrainer::best_uniform(const Draws& draws, const ByShare& pooled) con
 void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double uniform, Draws& all,
                                CumulativeProbability* density) const {
   const std::uint32_t count = grid.bins();
-  static thread_local std::vector<double> moment, drawn, volume, expected;
+  static thread_local std::vector<double> found, drawn, volume, expected;
   static thread_local std::vector<float> masses;
-  for (auto* heap : {&moment, &drawn, &volume, &expected}) heap->resize(2 * count);
+  for (auto* heap : {&found, &drawn, &volume, &expected}) heap->resize(2 * count);
   masses.resize(count);
   for (std::uint32_t b = 0; b < count; ++b) {
-    moment[count + b] = bins[b].moment;
+    found[count + b] = bins[b].sum;
     drawn[count + b] = bins[b].draws;
     volume[count + b] = grid.volume(b);
   }
   for (std::uint32_t node = count - 1; node > 0; --node)
-    for (auto* heap : {&moment, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
+    for (auto* heap : {&found, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
   // Each half is drawn to the whole that it is part of, the more the fewer samples it has seen, unless the two halves
   // differ by more than chance would have it: light through a gap stands out after a few hits. A hit is the f / q that
   // a typical unit of light comes with; hits of the halves, if these were alike, would be binomial.
   const double hit = all.sum > 0 ? all.square / all.sum : 1;
-  expected[1] = all.n > 0 ? moment[1] / all.n : 0;
+  expected[1] = all.n > 0 ? found[1] / all.n : 0;
   double sum = 0;
-  const bool squared = m_settings.target == FieldSettings::Target::second_moment;
-  const auto wanted = [squared](double m) { return squared ? std::sqrt(m) : m; };
   for (std::uint32_t node = 2; node < 2 * count; ++node) {
     const double whole = expected[node / 2];
-    const double own = volume[node] > 0 && all.n > 0 ? moment[node] / (all.n * volume[node]) : 0;
+    const double own = volume[node] > 0 && all.n > 0 ? found[node] / (all.n * volume[node]) : 0;
     double belief = drawn[node] / (drawn[node] + m_settings.shrink);
-    const double hits = moment[node / 2] / hit, alike = volume[node] / volume[node / 2];
+    const double hits = found[node / 2] / hit, alike = volume[node] / volume[node / 2];
     if (hits > 0 && alike > 0 && alike < 1) {
-      const double difference = moment[node] / moment[node / 2] - alike;
+      const double difference = found[node] / found[node / 2] - alike;
       const double chi_squared = hits * difference * difference / (alike * (1 - alike));
       if (chi_squared > kByChance) belief = std::max(belief, 1 - kByChance / chi_squared);
     }
     expected[node] = belief * own + (1 - belief) * whole;
-    if (node >= count) sum += wanted(expected[node]) * volume[node];
+    if (node >= count) sum += expected[node] * volume[node];
   }
   const double effective = all.effective();
   const double share = sum > 0 ? (1 - uniform) * effective / (effective + m_settings.trust) : 0;
@@ -349,8 +337,8 @@ void FieldTrainer::fit_density(const HalvingGrid& grid, std::span<const Bin> bin
   // The density will be a better one: what was drawn with it will soon count more.
   for (float& square_with : all.with_share) square_with *= 0.5f;
   for (std::uint32_t b = 0; b < count; ++b)
-    masses[b] = static_cast<float>(volume[count + b] *
-                                   (1 - share + (share > 0 ? share * wanted(expected[count + b]) / sum : 0)));
+    masses[b] =
+        static_cast<float>(volume[count + b] * (1 - share + (share > 0 ? share * expected[count + b] / sum : 0)));
   grid.set_density(masses, density);
 }
 

@@ -11,9 +11,9 @@
 
 namespace warpath {
 
-/// Learns a field from the vertices of passes. The density of a bin goes with the mean of what comes back, or with the
-/// root of its second moment, which makes the variance of the whole remaining path least [Vorba et al. 2019, Path
-/// Guiding in Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding] but is known less well.
+/// Learns a field from the vertices of passes. The density of a bin goes with the mean of what comes back: the root of
+/// its second moment would make the variance of the whole remaining path least [Vorba et al. 2019, Path Guiding in
+/// Production, chapter 10; Rath et al. 2020, Variance-Aware Path Guiding], but is known too badly.
 class FieldTrainer final : public VertexTrainer {
  public:
   /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
@@ -61,8 +61,7 @@ class FieldTrainer final : public VertexTrainer {
     std::array<double, FieldTree::kFeatures> sum{}, square{};  // of features
   };
   struct Bin {
-    float moment =
-        0;  // sum of f / q, or f^2 / q: over the draws of the cell and the bin's volume, the mean of f, or f^2
+    float sum = 0;  // of f / q: over the draws of the cell and the bin's volume, the mean of f
     float draws = 0;
   };
 
