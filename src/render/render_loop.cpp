@@ -15,8 +15,6 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-double seconds_since(Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); }
-
 /// What a path costs with a warp at its vertices, over what one costs without, by count of operations: looking a vertex
 /// up, two densities, what half of the paths teach, and longer paths with more light to look for, against two rays, a
 /// BSDF and a light.
@@ -46,19 +44,19 @@ class Trial {
   static bool is_plain(int done) { return done < kTrialSpp; }
   /// Whether it teaches the warp.
   bool teaches(int done) const { return !m_by_clock || done != kPlainCostSpp; }
-  void judge(const ImageEstimator& estimator, int before, double seconds_per_spp, Guide& guide) {
+  void judge(const ImageEstimator& estimator, int done, double seconds_per_spp, Guide& guide) {
     const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
-    if (is_plain(before)) {
+    if (is_plain(done)) {
       m_plain_error = error;
-      if (before == kPlainCostSpp) m_plain_seconds = seconds_per_spp;
+      if (done == kPlainCostSpp) m_plain_seconds = seconds_per_spp;
       m_teaching_seconds = std::max(0.0, seconds_per_spp - m_plain_seconds);
       return;
     }
     // Passes double, and the last one teaches nothing: half of all paths do.
     const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
     const double gain = m_plain_error / (error * cost);
-    const bool settled = before >= kSecondLookSpp;
-    if (!settled && before > kTrialSpp) return;
+    const bool settled = done >= kSecondLookSpp;
+    if (!settled && done > kTrialSpp) return;
     const bool pays = !(gain < (settled ? kLearned : kStillLearns));
     guide.choice = fmt::format(
         "{}: a field at every vertex has {:.2f} x the efficiency, 1 / (error x cost), and its paths cost {:.2f} x as "
@@ -103,7 +101,7 @@ void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, flo
 
 void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide, const Progress& progress,
                    const std::function<void()>& checkpoint) {
-  const auto left = [&] { return -seconds_since(*budget.deadline); };
+  const auto left = [&] { return std::chrono::duration<double>(*budget.deadline - Clock::now()).count(); };
   const double whole = budget.deadline ? std::max(1e-3, left()) : 1;
   double per_spp = 0;  // seconds, of the pass before
   Trial trial(budget.deadline.has_value());
@@ -125,18 +123,17 @@ void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide
       if (next == 0) break;
       last = done + next == budget.spp;
     }
-    const int before = done;
     const auto report = [&](double fraction) {
       if (!progress) return;
-      progress(budget.deadline ? 1 - left() / whole : (before + fraction * next) / budget.spp);
+      progress(budget.deadline ? 1 - left() / whole : (done + fraction * next) / budget.spp);
     };
-    const auto stop = [&] { return budget.deadline && before > 0 && Clock::now() > *budget.deadline; };
-    const auto start = Clock::now();
+    const auto stop = [&] { return budget.deadline && done > 0 && left() < 0; };
+    const Stopwatch clock;
     const bool teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
     add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), teaches, online ? weight_of_pass(done) : 1,
              guide, report, stop);
-    per_spp = seconds_since(start) / next;
-    if (guide.automatic && !g_interrupted) trial.judge(estimator, before, per_spp, guide);
+    per_spp = clock.wall() / next;
+    if (guide.automatic && !g_interrupted) trial.judge(estimator, done, per_spp, guide);
     done += next;
     checkpoint();
   }
