@@ -74,7 +74,10 @@ Scatter resolve(const Materials& materials, BsdfId id, const Vertices& w, std::s
 /// Relative to what rounding of the half vector does to a lobe of alpha 0.1.
 void expect_near(float a, float b) { EXPECT_NEAR(a, b, 1e-4f * std::max(std::abs(a), std::abs(b)) + 1e-6f); }
 
-TEST(PlainBsdf, EvaluatesAsTheBsdfDoes) {
+/// Calls check(plain, vertices, resolve), where resolve(k) is the BSDF at vertex k, for every plain one and SIMD
+/// target.
+template <class Check>
+void on_every_plain_bsdf(const Check& check) {
   test::BsdfBuilder builder;
   const auto cases = plain_cases(builder);
   const Materials materials(builder.scene);
@@ -84,47 +87,46 @@ TEST(PlainBsdf, EvaluatesAsTheBsdfDoes) {
       const PlainBsdf* plain = materials.plain(bsdf.id);
       ASSERT_NE(plain, nullptr);
       Vertices w;
-      eval_plain(*plain, w.plain, 0, kCount, w.wo, w.value, w.pdf);
-      int lit = 0;
-      for (std::size_t k = 0; k < kCount && !HasFailure(); ++k) {
-        float pdf;
-        const Color value = eval_pdf_bsdf(resolve(materials, bsdf.id, w, k), w.wo[k], pdf);
-        for (int c = 0; c < 3; ++c) expect_near(w.value[k][c], value[c]);
-        expect_near(w.pdf[k], pdf);
-        lit += pdf > 0;
-      }
-      EXPECT_GT(lit, 600);
+      check(*plain, w, [&](std::size_t k) { return resolve(materials, bsdf.id, w, k); });
     }
   });
 }
 
-TEST(PlainBsdf, SamplesAsTheBsdfDoes) {
-  test::BsdfBuilder builder;
-  const auto cases = plain_cases(builder);
-  const Materials materials(builder.scene);
-  testing::on_every_simd_target([&] {
-    for (const auto& bsdf : cases) {
-      SCOPED_TRACE(bsdf.name);
-      Vertices w;
-      sample_plain(*materials.plain(bsdf.id), w.plain, 0, kCount, w.lobe, w.u, w.v, w.made, w.value, w.pdf);
-      int made = 0;
-      for (std::size_t k = 0; k < kCount && !HasFailure(); ++k) {
-        const Scatter scatter = resolve(materials, bsdf.id, w, k);
-        const BsdfSample s = sample_bsdf(scatter, w.lobe[k], {w.u[k], w.v[k]});
-        if (s.pdf == 0 || w.pdf[k] == 0) {  // a direction in the surface may be on either side
-          EXPECT_LT(std::abs(s.pdf - w.pdf[k]), 1e-4f);
-          continue;
-        }
-        EXPECT_LT((s.wo - w.made[k]).length(), 2e-5f);
-        // Of the direction that it made: a narrow lobe changes much from one to the other.
-        float pdf;
-        const Color value = eval_pdf_bsdf(scatter, w.made[k], pdf);
-        expect_near(w.pdf[k], pdf);
-        for (int c = 0; c < 3; ++c) expect_near(w.value[k][c], value[c] / pdf);
-        ++made;
-      }
-      EXPECT_GT(made, 1000);
+TEST(PlainBsdf, EvaluatesAsTheBsdfDoes) {
+  on_every_plain_bsdf([](const PlainBsdf& plain, Vertices& w, const auto& bsdf_at) {
+    eval_plain(plain, w.plain, 0, kCount, w.wo, w.value, w.pdf);
+    int lit = 0;
+    for (std::size_t k = 0; k < kCount && !HasFailure(); ++k) {
+      float pdf;
+      const Color value = eval_pdf_bsdf(bsdf_at(k), w.wo[k], pdf);
+      for (int c = 0; c < 3; ++c) expect_near(w.value[k][c], value[c]);
+      expect_near(w.pdf[k], pdf);
+      lit += pdf > 0;
     }
+    EXPECT_GT(lit, 600);
+  });
+}
+
+TEST(PlainBsdf, SamplesAsTheBsdfDoes) {
+  on_every_plain_bsdf([](const PlainBsdf& plain, Vertices& w, const auto& bsdf_at) {
+    sample_plain(plain, w.plain, 0, kCount, w.lobe, w.u, w.v, w.made, w.value, w.pdf);
+    int made = 0;
+    for (std::size_t k = 0; k < kCount && !HasFailure(); ++k) {
+      const Scatter scatter = bsdf_at(k);
+      const BsdfSample s = sample_bsdf(scatter, w.lobe[k], {w.u[k], w.v[k]});
+      if (s.pdf == 0 || w.pdf[k] == 0) {  // a direction in the surface may be on either side
+        EXPECT_LT(std::abs(s.pdf - w.pdf[k]), 1e-4f);
+        continue;
+      }
+      EXPECT_LT((s.wo - w.made[k]).length(), 2e-5f);
+      // Of the direction that it made: a narrow lobe changes much from one to the other.
+      float pdf;
+      const Color value = eval_pdf_bsdf(scatter, w.made[k], pdf);
+      expect_near(w.pdf[k], pdf);
+      for (int c = 0; c < 3; ++c) expect_near(w.value[k][c], value[c] / pdf);
+      ++made;
+    }
+    EXPECT_GT(made, 1000);
   });
 }
 
