@@ -188,6 +188,33 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(other.returncode, 2)
         self.assertIn("another command", other.stderr)
 
+    def test_replay_repeats_what_the_clock_decided(self):
+        def compare(name, *options):
+            report = self.path(name)
+            result = self.warpath("compare", BOX, "--methods", "none,auto,kdtree:film+bounce1", "--examples", 4096, "--reference-spp", 8, "--report",
+                                  report, "--size", "32x24", *options)
+            if result.returncode != 0:
+                return result
+            with open(os.path.join(report, "results.json")) as file:
+                return json.load(file)["results"]
+
+        timed = compare("timed", "--time", 0.7, "--threads", 2, "--seed", 5)
+        record = self.path("timed/results.json")
+        again = compare("again", "--replay", record, "--threads", 1, "--seed", 5)
+        for before, after in zip(timed, again):
+            self.assertGreater(len(before["passes"]), 4)
+            for key in ("method", "samples", "passes", "mean", "mean_rest", "mse", "relmse", "mse_predicted"):
+                self.assertEqual(before[key], after[key], key)
+        other = compare("other", "--replay", record, "--seed", 6)
+        self.assertEqual(other.returncode, 2)
+        self.assertIn("no run of none under --time with seed 6", other.stderr)
+        self.assertFalse(os.path.exists(self.path("other")))
+        for method, seed, code in (("auto", 5, 0), ("field", 5, 2)):
+            image = self.path(method + ".exr")
+            result = self.warpath("render", BOX, "--warp", method, "--replay", record, "--seed", seed, "--size", "32x24", "-o", image)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertEqual(os.path.exists(image), code == 0)
+
     def test_interrupt_leaves_the_image_so_far(self):
         out = self.path("out.exr")
         process = subprocess.Popen([WARPATH, "render", BOX, "--spp", "1000000", "-o", out, *SMALL], stderr=subprocess.PIPE)

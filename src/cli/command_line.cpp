@@ -120,9 +120,14 @@ void add_options(CLI::App& app, TrainingOptions& options) {
 void add_options(CLI::App& app, RenderOptions& options) {
   auto* by_samples =
       app.add_option("--spp", options.spp, "Samples per pixel (default: the scene's)")->check(CLI::Range(1, 1 << 24));
-  app.add_option("--time", options.time, "Seconds for everything after loading, training included")
-      ->check(CLI::PositiveNumber)
-      ->excludes(by_samples);
+  auto* by_time = app.add_option("--time", options.time, "Seconds for everything after loading, training included")
+                      ->check(CLI::PositiveNumber)
+                      ->excludes(by_samples);
+  app.add_option("--replay", options.replay,
+                 "results.json of runs under --time: renders the passes of the run with the same method, seed and size")
+      ->check(CLI::ExistingFile)
+      ->excludes(by_samples)
+      ->excludes(by_time);
   app.add_option(
          "--objective", options.objective_name,
          "The error that samples are placed to lessen where the film is stratified: mse, relmse, or even for as "

@@ -108,12 +108,18 @@ void ComparisonRunner::run(int threads) {
   c.settings["sampler"] = m_command.render.sampler_name.value_or("independent");
   c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
 
+  // What is wrong is said before any work.
+  for (const Method& method : m_methods) {
+    m_command.render.sampler(method.layout);
+    for (int run = 0; run < m_command.runs; ++run)
+      make_budget(m_command.render, scene, method, c.seed + static_cast<std::uint64_t>(run));
+  }
+
   prepare_reference();
   m_data.reference = m_reference.image;
   c.reference = m_reference.path.string();
   c.reference_has_variance = m_reference.variance.has_value();
 
-  for (const Method& method : m_methods) m_command.render.sampler(method.layout);  // throws before any work
   if (m_command.resume) take_finished_runs();
   for (int run = 0; run < m_command.runs && !g_interrupted; ++run)
     for (const Method& method : m_methods) {
@@ -174,7 +180,9 @@ void ComparisonRunner::take_finished_runs() {
     throw ConfigError(fmt::format("--resume: {} was left by another command: {}", file.string(), before.command));
   if (before.commit != c.commit) c.warnings.push_back(fmt::format("some runs are of commit {}", before.commit));
   const RenderOptions& render = m_command.render;
-  const auto is_whole = [&](const MethodRun& run) {
+  const auto is_whole = [&](const Method& method, const MethodRun& run) {
+    if (!render.replay.empty())
+      return run.passes.size() == make_budget(render, m_tracer->scene(), method, run.seed).replay.size();
     if (render.time) return run.total_seconds > 0.9 * *render.time;
     return run.spp > render.spp.value_or(m_tracer->scene().sample_count) - 0.5;
   };
@@ -182,7 +190,8 @@ void ComparisonRunner::take_finished_runs() {
     const auto image = m_command.directory / (file_name(method.name) + ".exr");
     if (!std::filesystem::exists(image)) continue;
     for (const MethodRun& run : before.results)
-      if (run.method == method.name && run.seed - c.seed < static_cast<std::uint64_t>(m_command.runs) && is_whole(run))
+      if (run.method == method.name && run.seed - c.seed < static_cast<std::uint64_t>(m_command.runs) &&
+          is_whole(method, run))
         c.results.push_back(run);
     if (has_run(method, 0)) m_data.images.push_back({method.name, read_image(image).image});
   }
@@ -201,7 +210,7 @@ bool ComparisonRunner::has_run(const Method& method, int run) const {
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const std::uint64_t seed = m_command.common.seed + static_cast<std::uint64_t>(run);
   const auto clock = start_clock();
-  const Budget budget = make_budget(m_command.render, m_tracer->scene().sample_count);
+  const Budget budget = make_budget(m_command.render, m_tracer->scene(), method, seed);
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)
@@ -216,7 +225,7 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   result.method = method.name;
   result.family = method.family;
   result.dims = method.layout.name();
-  result.size = fmt::format("{}x{}", m_data.comparison.width, m_data.comparison.height);
+  result.size = size_name(m_tracer->scene().film);
   result.seed = seed;
   result.candidate_seconds = prepared.candidate_seconds;
   result.train_seconds = prepared.log.seconds;
@@ -236,12 +245,13 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
     prepared.add_candidates(estimator);
     StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
                            m_command.common.quiet);
-    render_passes(estimator, budget, prepared.guide, progress.callback(), [&] {
+    auto passes = render_passes(estimator, budget, prepared.guide, progress.callback(), [&] {
       const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
       result.error_curve.push_back(
           {estimator.spp(), prepare_seconds + prepared.guide.fit_seconds + estimator.cost().total(), errors.mse,
            errors.relmse, prepare_cpu_seconds + prepared.guide.fit_cpu_seconds + estimator.cost().cpu_total()});
     });
+    if (budget.by_clock()) result.passes = std::move(passes);
   }
   if (estimator.cost().samples == 0) throw Interrupted{};
 

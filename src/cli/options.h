@@ -31,6 +31,7 @@ struct CommonOptions {
 struct RenderOptions {
   std::optional<int> spp;
   std::optional<double> time;
+  std::filesystem::path replay;             ///< results.json whose runs under --time are repeated
   std::string crop;                         ///< X,Y,W,H
   std::string aov;                          ///< albedo,normal,depth
   std::string objective_name = "relmse";    ///< mse, relmse or even

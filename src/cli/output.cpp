@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 
+#include "cli/replay.h"
 #include "estimate/first_hit_estimator.h"
+#include "scene/scene.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -23,9 +25,13 @@ std::function<double()> start_clock() {
   return [start] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
 }
 
-Budget make_budget(const RenderOptions& options, int scene_spp) {
+std::string size_name(const FilmSettings& film) { return fmt::format("{}x{}", film.crop_width, film.crop_height); }
+
+Budget make_budget(const RenderOptions& options, const Scene& scene, const Method& method, std::uint64_t seed) {
   Budget budget;
-  budget.spp = options.spp.value_or(scene_spp);
+  budget.spp = options.spp.value_or(scene.sample_count);
+  if (!options.replay.empty())
+    budget.replay = recorded_passes(options.replay, method.name, seed, size_name(scene.film));
   if (options.time)
     budget.deadline =
         std::chrono::steady_clock::now() +

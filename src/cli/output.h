@@ -26,8 +26,11 @@ class Threads {
 
 /// A clock that starts now; a call tells the seconds since.
 std::function<double()> start_clock();
-/// The budget of the options; `scene_spp` where they say nothing. Time runs from now.
-Budget make_budget(const RenderOptions& options, int scene_spp);
+/// The budget of the options for one run; the scene's samples per pixel where they say nothing. Time runs from now.
+/// Throws ConfigError if there is nothing to replay.
+Budget make_budget(const RenderOptions& options, const Scene& scene, const Method& method, std::uint64_t seed);
+/// Of the film, or its part that is rendered: WxH.
+std::string size_name(const FilmSettings& film);
 
 enum class Aov { albedo, normal, depth };
 /// `albedo,normal`; throws ConfigError on an unknown one.

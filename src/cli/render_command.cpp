@@ -18,7 +18,7 @@ void run(const RenderCommand& command) {
   const Sampler sampler = command.render.sampler(method.layout);
   const std::vector<Aov> aovs = parse_aovs(command.render.aov);
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, &command.render));
-  const Budget budget = make_budget(command.render, tracer->scene().sample_count);
+  const Budget budget = make_budget(command.render, tracer->scene(), method, common.seed);
   const auto clock = start_clock();
 
   const TrainingOptions& training = command.training;

@@ -44,30 +44,32 @@ class Trial {
   static bool is_plain(int done) { return done < kTrialSpp; }
   /// Whether it teaches the warp.
   bool teaches(int done) const { return !m_by_clock || done != kPlainCostSpp; }
-  void judge(const ImageEstimator& estimator, int done, double seconds_per_spp, Guide& guide) {
+  /// Told of the pass that began at `done`; gives the warp up, and returns true, if it does not pay.
+  bool judge(const ImageEstimator& estimator, int done, double seconds_per_spp, Guide& guide) {
     const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
     if (is_plain(done)) {
       m_plain_error = error;
       if (done == kPlainCostSpp) m_plain_seconds = seconds_per_spp;
       m_teaching_seconds = std::max(0.0, seconds_per_spp - m_plain_seconds);
-      return;
+      return false;
     }
     // Passes double, and the last one teaches nothing: half of all paths do.
     const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
     const double gain = m_plain_error / (error * cost);
     const bool settled = done >= kSecondLookSpp;
-    if (!settled && done > kTrialSpp) return;
+    if (!settled && done > kTrialSpp) return false;
     const bool pays = !(gain < (settled ? kLearned : kStillLearns));
-    guide.choice = fmt::format(
+    const std::string choice = fmt::format(
         "{}: a field at every vertex has {:.2f} x the efficiency, 1 / (error x cost), and its paths cost {:.2f} x as "
         "much",
         pays ? "field" : "plain path tracing", gain, cost);
-    log::info("auto: {}", guide.choice);
-    if (!pays) {
-      guide.warp = nullptr;
-      guide.trainer = nullptr;
-    }
-    if (settled || !pays) guide.automatic = false;
+    log::info("auto: {}", choice);
+    if (!pays)
+      guide.give_up(choice);
+    else
+      guide.choice = choice;
+    if (settled) guide.automatic = false;
+    return !pays;
   }
 
  private:
@@ -99,44 +101,68 @@ void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, flo
 
 }  // namespace
 
-void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide, const Progress& progress,
-                   const std::function<void()>& checkpoint) {
+std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide,
+                                      const Progress& progress, const std::function<void()>& checkpoint) {
+  const bool replays = !budget.replay.empty();
   const auto left = [&] { return std::chrono::duration<double>(*budget.deadline - Clock::now()).count(); };
   const double whole = budget.deadline ? std::max(1e-3, left()) : 1;
+  int planned = replays ? 0 : budget.spp;
+  for (const PassRecord& pass : budget.replay) planned += pass.spp;
   double per_spp = 0;  // seconds, of the pass before
-  Trial trial(budget.deadline.has_value());
+  Trial trial(budget.by_clock());
   const bool online = guide.trainer != nullptr;
+  std::vector<PassRecord> passes;
   int done = 0;
-  while (!g_interrupted) {
-    int next = std::max(1, done);
+  // Decides on the next pass; false if no more fits into the budget.
+  const auto plan = [&](PassRecord& pass) {
+    pass.spp = std::max(1, done);
     bool last;
     if (budget.deadline) {
-      last = false;
-      if (done > 0) {
-        const int fits = static_cast<int>(std::min(left() / per_spp, 1e8));
-        if (fits < 1) break;
-        last = 2 * next > fits;
-        if (last) next = fits;
-      }
+      const int fits = done > 0 ? static_cast<int>(std::min(left() / per_spp, 1e8)) : 0;
+      if (done > 0 && fits < 1) return false;
+      last = done > 0 && 2 * pass.spp > fits;
+      if (last) pass.spp = fits;
     } else {
-      next = std::min(next, budget.spp - done);
-      if (next == 0) break;
-      last = done + next == budget.spp;
+      pass.spp = std::min(pass.spp, budget.spp - done);
+      if (pass.spp == 0) return false;
+      last = done + pass.spp == budget.spp;
+    }
+    pass.teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
+    return true;
+  };
+  while (!g_interrupted) {
+    PassRecord pass;
+    if (replays) {
+      if (passes.size() == budget.replay.size()) break;
+      pass = budget.replay[passes.size()];
+    } else if (!plan(pass)) {
+      break;
     }
     const auto report = [&](double fraction) {
-      if (!progress) return;
-      progress(budget.deadline ? 1 - left() / whole : (done + fraction * next) / budget.spp);
+      if (progress) progress(budget.deadline ? 1 - left() / whole : (done + fraction * pass.spp) / planned);
     };
-    const auto stop = [&] { return budget.deadline && done > 0 && left() < 0; };
+    // Asked once before each batch.
+    std::uint64_t begun = 0;
+    const auto stop = [&] {
+      const bool ends = replays ? begun == pass.batches : budget.deadline && done > 0 && left() < 0;
+      if (!ends) ++begun;
+      return ends;
+    };
     const Stopwatch clock;
-    const bool teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
-    add_pass(estimator, next, !guide.automatic || !Trial::is_plain(done), teaches, online ? weight_of_pass(done) : 1,
-             guide, report, stop);
-    per_spp = clock.wall() / next;
-    if (guide.automatic && !g_interrupted) trial.judge(estimator, done, per_spp, guide);
-    done += next;
+    add_pass(estimator, pass.spp, !guide.automatic || !Trial::is_plain(done), pass.teaches,
+             online ? weight_of_pass(done) : 1, guide, report, stop);
+    per_spp = clock.wall() / pass.spp;
+    if (replays) {
+      if (pass.gave_up) guide.give_up("plain path tracing, as recorded");
+    } else {
+      if (guide.automatic && !g_interrupted) pass.gave_up = trial.judge(estimator, done, per_spp, guide);
+      pass.batches = begun;
+    }
+    passes.push_back(pass);
+    done += pass.spp;
     checkpoint();
   }
+  return passes;
 }
 
 }  // namespace warpath

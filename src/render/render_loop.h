@@ -3,17 +3,22 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/ordered.h"
+#include "core/pass_record.h"
 #include "estimate/image_estimator.h"
 #include "train/vertex_trainer.h"
 
 namespace warpath {
 
-/// How much to render: samples per pixel, or until a deadline.
+/// How much to render: samples per pixel, or until a deadline, or what was rendered until an earlier one.
 struct Budget {
   int spp = 0;
   std::optional<std::chrono::steady_clock::time_point> deadline;
+  std::vector<PassRecord> replay;  ///< if there are any: these passes, whatever the time
+  /// Whether the clock decides, or has decided: such a render can only be repeated by the record of its passes.
+  bool by_clock() const { return deadline || !replay.empty(); }
 };
 
 /// What passes hand on to those that follow.
@@ -28,11 +33,17 @@ struct Guide {
   double fit_cpu_seconds = 0;                ///< the same, of all threads
   std::uint64_t taught = 0;                  ///< paths that the warp has learned from
   bool empty() const { return !objective && !warp && !trainer; }
+  void give_up(std::string why) {
+    warp = nullptr, trainer = nullptr;
+    automatic = false;
+    choice = std::move(why);
+  }
 };
 
 /// Renders in passes that double what is there, so that an image that ends early is even, and calls `checkpoint` after
 /// each. Every pass uses what the guide has learned from those before, and counts in the image. Ends early on Ctrl-C.
-void render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide, const Progress& progress,
-                   const std::function<void()>& checkpoint);
+/// Returns what was decided for each pass.
+std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& budget, Guide& guide,
+                                      const Progress& progress, const std::function<void()>& checkpoint);
 
 }  // namespace warpath

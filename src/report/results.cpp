@@ -37,6 +37,15 @@ void for_each_field(Point& point, F&& f) {
   f("cpu_seconds", point.cpu_seconds);
 }
 
+template <class Record, class F>
+requires std::is_same_v<std::remove_const_t<Record>, PassRecord>
+void for_each_field(Record& pass, F&& f) {
+  f("spp", pass.spp);
+  f("batches", pass.batches);
+  f("teaches", pass.teaches);
+  f("gave_up", pass.gave_up);
+}
+
 template <class Run, class F>
 requires std::is_same_v<std::remove_const_t<Run>, MethodRun>
 void for_each_field(Run& run, F&& f) {
@@ -76,6 +85,7 @@ void for_each_field(Run& run, F&& f) {
   f("training_stopped", run.training_stopped);
   f("error_curve", run.error_curve);
   f("training_curve", run.training_curve);
+  f("passes", run.passes);
 }
 
 template <class C, class F>

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/pass_record.h"
 #include "report/metrics.h"
 
 namespace warpath {
@@ -67,6 +68,7 @@ struct MethodRun {
   std::string training_stopped;          ///< why training ended
   std::vector<ErrorPoint> error_curve;
   std::vector<TrainingPoint> training_curve;
+  std::vector<PassRecord> passes;  ///< under --time
 
   void set_errors(const ImageErrors& errors);
 };
