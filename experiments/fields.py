@@ -47,11 +47,12 @@ T_OF_TEN_RUNS = 1.833
 def auto_everywhere():
     """auto against plain path tracing on every scene, ten interleaved runs at equal time: where a warp does not pay, looking costs little."""
     lines = ["| scene | objective | none, error | auto, error | auto over none | upper bound, 95 % | what it chose |", "|" + "---|" * 7]
-    scenes = [(name, shared_scene(name), {"size": "320x180", "max_depth": 8, "time": 10, **reference(name)}) for name in BOTH]
-    scenes += [(name, scene, {**options, "time": 5}) for name, scene, options in references_of_own_scenes()]
+    scenes = [(name, shared_scene(name), {"size": "320x180", "max_depth": 8, **reference(name)}) for name in BOTH]
+    scenes += references_of_own_scenes()
     for name, scene, options in scenes:
         for objective in ("mse", "relmse"):
-            runs = compare(f"auto-everywhere/{name}-{objective}", scene, ["none", "auto"], runs=10, objective=objective, sampler="sobol", **options)
+            label = f"auto-everywhere/{name}-{objective}"
+            runs = compare(label, scene, ["none", "auto"], time=5, runs=10, objective=objective, sampler="sobol", **options)
             none, auto = of_method(runs, "none"), of_method(runs, "auto")
             ratio, error = gain(auto, none, objective)
             means = ("{:.4g}".format(sum(run[objective] for run in some) / len(some)) for some in (none, auto))
@@ -96,7 +97,7 @@ def ablation():
             table.extend(rows_of(compare(f"{place}/{label}", scene, methods, **{**fixed, **options}), base, label))
 
         # The first hit's direction: one density for all pixels, one for each place, and one by a network.
-        add("first-hit", [f"spline:{FIRST_HIT}", f"field:{FIRST_HIT}", f"neural:{FIRST_HIT}"], objective="relmse")
+        add("first-hit", [f"spline:{FIRST_HIT}", f"field:{FIRST_HIT}", f"neural:{FIRST_HIT}"], objective="relmse", epp=4)
         add("light-of-first-hit", ["field:bounce1.light+bounce1.light_uv"], objective="relmse")
         add("even-allocation", ["field"], objective="even")
         add("mse-allocation", ["field"], objective="mse")
