@@ -53,8 +53,9 @@ class ImageEstimator {
   ImageEstimator(const Tracer& tracer, Layout layout, std::shared_ptr<const Proposal> proposal, std::uint64_t seed,
                  Sampler sampler = Sampler::independent);
 
-  /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and 4 x spp camera rays to each
-  /// pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it has.
+  /// Adds `spp` samples per pixel (spp x pixels samples where the film is warped), and at least 4 x spp camera rays to
+  /// each pixel that may see an emitter. stop() is asked between batches; a pass that was stopped counts with what it
+  /// has.
   void add_pass(int spp, const Progress& progress = {}, const std::function<bool()>& stop = {});
 
   /// The same with guidance, for a stratified film; with a warp of vertices the proposal must be null. Every pass
@@ -62,7 +63,8 @@ class ImageEstimator {
   void add_guided_pass(int spp, const Guidance& guidance, const Progress& progress = {},
                        const std::function<bool()>& stop = {});
 
-  /// Adds 4 x `spp` camera rays to each pixel that may see an emitter, and no path.
+  /// Adds at least 4 x `spp` camera rays to each pixel that may see an emitter, and no path; where these are few, as
+  /// many as a quarter of the paths.
   void add_emission_pass(int spp, const std::function<bool()>& stop = {});
 
   /// A path that was traced elsewhere from uniform numbers, film position (in [0,1)^2) included, such as a candidate of
