@@ -6,6 +6,9 @@ from tables import comparison_table, gain, of_method, rows_of, write_table
 from tool import compare, folder_of, own_scene, render_reference, shared_scene, train
 
 
+FIRST_HIT = "bounce1.lobe+bounce1"
+
+
 def field_at(label, methods, **options):
     """Both shared scenes, samples placed for either error."""
     for name in BOTH:
@@ -38,6 +41,21 @@ def references_of_own_scenes():
     film = {**small, "max_depth": 4, "defines": {"bulb": 7}}
     against = render_reference("references/coins", own_scene("coins"), 2048, "kdtree:film+bounce1", examples=640000, uniform=0.3, **film)
     yield "coins", own_scene("coins"), {**film, **against}
+
+
+def field_own_scenes():
+    """The project's own scenes at 128 spp: field for either error, all samples counted, and the joint spline, whose candidates are not."""
+    lines = ["| scene | field, MSE | field, relMSE | joint spline, MSE | relMSE |", "|" + "---|" * 5]
+    for name, scene, options in references_of_own_scenes():
+        cells = []
+        for objective, methods in (("mse", ["none", "field", f"spline:film+{FIRST_HIT}"]), ("relmse", ["none", "field"])):
+            label = f"field-own-scenes/{name}-{objective}"
+            runs = compare(label, scene, methods, spp=128, epp=4, runs=3, objective=objective, sampler="independent", **options)
+            cells.append(gain(of_method(runs, "none"), of_method(runs, "field"), objective))
+            if len(methods) > 2:
+                joint = [gain(of_method(runs, "none"), of_method(runs, methods[2]), error) for error in ("mse", "relmse")]
+        lines.append(f"| `scenes/{name}` | " + " | ".join("{:.2f} ± {:.2f}".format(*cell) for cell in cells + joint) + " |")
+    write_table(folder_of("field-own-scenes"), lines)
 
 
 #: Of Student's t with 9 degrees of freedom: one in twenty values is above.
@@ -82,8 +100,6 @@ def views():
         write_table(folder_of(label), comparison_table(results))
 
 
-FIRST_HIT = "bounce1.lobe+bounce1"
-
 
 def ablation():
     """What each part brings at 64 spp: conditioning, later vertices, light choice, loss, lobe, Sobol' points, allocation, what passes teach."""
@@ -111,4 +127,4 @@ def ablation():
         write_table(folder_of(place), table)
 
 
-ALL = (field_samples, field_time, ablation, auto_everywhere, door_ajar, views)
+ALL = (field_samples, field_time, ablation, field_own_scenes, auto_everywhere, door_ajar, views)
