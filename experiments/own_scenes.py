@@ -48,7 +48,8 @@ def billiards():
     methods = ["none", "uniform:film+bounce1", *WARPS_4D, "uniform:film+time", *blurred]
     results = compare("billiards", scene, methods, **options, **against)
     folder = folder_of("billiards")
-    write_table(folder, comparison_table(results))
+    published = compare("billiards/published-kdtree", scene, ["kdtree:film+bounce1"], **options, **against, kdtree_split="cyclic", kdtree_target="mean")
+    write_table(folder, comparison_table(results) + rows_of(published, results, "as published"))
     error_charts(folder, results)
     write_comparison(folder, ["none", *WARPS_4D], zoom=2)
     # The white ball's streak alone, where the place on the film depends on time: the true density, kd-tree, Real NVP.
