@@ -97,7 +97,7 @@ def training_time():
     line_chart(folder / "gain.svg", "CPU seconds of training, candidates included", "gain in MSE over plain path tracing", lines, rule=1)
 
 
-def twelve_dims(epps=(1, 4, 16)):
+def twelve_dims(epps=(1, 4, 16, 64, 256)):
     """12D on the kitchen (film and five bounces) with growing training sets: gain, time, and the memory that epp-4096 takes.
 
     epp-4096 has 131 M examples from 1.05 G candidates, an hour and a half of CPU time for these alone. So its cost is told from what a
