@@ -2,9 +2,8 @@
 
 from curves import error_charts
 from shared_scenes import BOTH, reference
-from tables import comparison_table, gain, of_method, rows_of, write_table
+from tables import column, comparison_table, gain, mean, of_method, rows_of, write_table
 from tool import compare, folder_of, own_scene, render_reference, shared_scene, train
-
 
 FIRST_HIT = "bounce1.lobe+bounce1"
 
@@ -47,14 +46,15 @@ def field_own_scenes():
     """The project's own scenes at 128 spp: field for either error, all samples counted, and the joint spline, whose candidates are not."""
     lines = ["| scene | field, MSE | field, relMSE | joint spline, MSE | relMSE |", "|" + "---|" * 5]
     for name, scene, options in references_of_own_scenes():
-        cells = []
-        for objective, methods in (("mse", ["none", "field", f"spline:film+{FIRST_HIT}"]), ("relmse", ["none", "field"])):
+        def measure(objective, *methods):
             label = f"field-own-scenes/{name}-{objective}"
-            runs = compare(label, scene, methods, spp=128, epp=4, runs=3, objective=objective, sampler="independent", **options)
-            cells.append(gain(of_method(runs, "none"), of_method(runs, "field"), objective))
-            if len(methods) > 2:
-                joint = [gain(of_method(runs, "none"), of_method(runs, methods[2]), error) for error in ("mse", "relmse")]
-        lines.append(f"| `scenes/{name}` | " + " | ".join("{:.2f} ± {:.2f}".format(*cell) for cell in cells + joint) + " |")
+            return compare(label, scene, ["none", *methods], spp=128, epp=4, runs=3, objective=objective, sampler="independent", **options)
+
+        joint = f"spline:film+{FIRST_HIT}"
+        mse, relmse = measure("mse", "field", joint), measure("relmse", "field")
+        cells = [(mse, "field", "mse"), (relmse, "field", "relmse"), (mse, joint, "mse"), (mse, joint, "relmse")]
+        gains = ["{:.2f} ± {:.2f}".format(*gain(of_method(runs, "none"), of_method(runs, method), error)) for runs, method, error in cells]
+        lines.append(f"| `scenes/{name}` | " + " | ".join(gains) + " |")
     write_table(folder_of("field-own-scenes"), lines)
 
 
@@ -73,7 +73,7 @@ def auto_everywhere():
             runs = compare(label, scene, ["none", "auto"], time=5, runs=10, objective=objective, sampler="sobol", **options)
             none, auto = of_method(runs, "none"), of_method(runs, "auto")
             ratio, error = gain(auto, none, objective)
-            means = ("{:.4g}".format(sum(run[objective] for run in some) / len(some)) for some in (none, auto))
+            means = (f"{mean(column(some, objective)):.4g}" for some in (none, auto))
             chosen = sorted({run["training_stopped"].split(":")[0] for run in auto})
             lines.append(f"| {name} | {objective} | {' | '.join(means)} | {ratio:.3f} ± {error:.3f} | {ratio + T_OF_TEN_RUNS * error:.3f} | {', '.join(chosen)} |")
     write_table(folder_of("auto-everywhere"), lines)
@@ -98,7 +98,6 @@ def views():
         against = render_reference(label, scene, 1024, objective="relmse", **turned)
         results = compare(label, scene, ["none", "field", field], **turned, spp=32, runs=5, **against)
         write_table(folder_of(label), comparison_table(results))
-
 
 
 def ablation():
