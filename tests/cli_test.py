@@ -205,6 +205,9 @@ class CommandLine(unittest.TestCase):
             self.assertGreater(len(before["passes"]), 4)
             for key in ("method", "samples", "passes", "mean", "mean_rest", "mse", "relmse", "mse_predicted"):
                 self.assertEqual(before[key], after[key], key)
+        # In place: the file is read before it is written anew.
+        in_place = compare("timed", "--replay", record, "--threads", 1, "--seed", 5)
+        self.assertEqual([run["passes"] for run in in_place], [run["passes"] for run in timed])
         other = compare("other", "--replay", record, "--seed", 6)
         self.assertEqual(other.returncode, 2)
         self.assertIn("no run of none under --time with seed 6", other.stderr)

@@ -109,10 +109,10 @@ void ComparisonRunner::run(int threads) {
   c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
 
   // What is wrong is said before any work.
+  if (!m_command.render.replay.empty()) m_replay.emplace(m_command.render.replay);
   for (const Method& method : m_methods) {
     m_command.render.sampler(method.layout);
-    for (int run = 0; run < m_command.runs; ++run)
-      make_budget(m_command.render, scene, method, c.seed + static_cast<std::uint64_t>(run));
+    for (int run = 0; run < m_command.runs; ++run) replayed(method, c.seed + static_cast<std::uint64_t>(run));
   }
 
   prepare_reference();
@@ -181,8 +181,7 @@ void ComparisonRunner::take_finished_runs() {
   if (before.commit != c.commit) c.warnings.push_back(fmt::format("some runs are of commit {}", before.commit));
   const RenderOptions& render = m_command.render;
   const auto is_whole = [&](const Method& method, const MethodRun& run) {
-    if (!render.replay.empty())
-      return run.passes.size() == make_budget(render, m_tracer->scene(), method, run.seed).replay.size();
+    if (m_replay) return run.passes.size() == replayed(method, run.seed).size();
     if (render.time) return run.total_seconds > 0.9 * *render.time;
     return run.spp > render.spp.value_or(m_tracer->scene().sample_count) - 0.5;
   };
@@ -207,10 +206,16 @@ bool ComparisonRunner::has_run(const Method& method, int run) const {
                      [&](const MethodRun& r) { return r.method == method.name && r.seed == seed; });
 }
 
+std::vector<PassRecord> ComparisonRunner::replayed(const Method& method, std::uint64_t seed) const {
+  if (!m_replay) return {};
+  return m_replay->passes(method.name, seed, size_name(m_tracer->scene().film));
+}
+
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const std::uint64_t seed = m_command.common.seed + static_cast<std::uint64_t>(run);
   const auto clock = start_clock();
-  const Budget budget = make_budget(m_command.render, m_tracer->scene(), method, seed);
+  Budget budget = make_budget(m_command.render, m_tracer->scene().sample_count);
+  budget.replay = replayed(method, seed);
   // Candidates are shared by the methods of a run: what they cost counts for each of them.
   auto& trainer = m_trainers[run];
   if (!trainer)

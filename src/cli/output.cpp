@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 
-#include "cli/replay.h"
 #include "estimate/first_hit_estimator.h"
 #include "scene/scene.h"
 #include "warpath/error.h"
@@ -27,11 +26,9 @@ std::function<double()> start_clock() {
 
 std::string size_name(const FilmSettings& film) { return fmt::format("{}x{}", film.crop_width, film.crop_height); }
 
-Budget make_budget(const RenderOptions& options, const Scene& scene, const Method& method, std::uint64_t seed) {
+Budget make_budget(const RenderOptions& options, int scene_spp) {
   Budget budget;
-  budget.spp = options.spp.value_or(scene.sample_count);
-  if (!options.replay.empty())
-    budget.replay = recorded_passes(options.replay, method.name, seed, size_name(scene.film));
+  budget.spp = options.spp.value_or(scene_spp);
   if (options.time)
     budget.deadline =
         std::chrono::steady_clock::now() +

@@ -26,9 +26,8 @@ class Threads {
 
 /// A clock that starts now; a call tells the seconds since.
 std::function<double()> start_clock();
-/// The budget of the options for one run; the scene's samples per pixel where they say nothing. Time runs from now.
-/// Throws ConfigError if there is nothing to replay.
-Budget make_budget(const RenderOptions& options, const Scene& scene, const Method& method, std::uint64_t seed);
+/// The budget of the options; `scene_spp` where they say nothing. Time runs from now.
+Budget make_budget(const RenderOptions& options, int scene_spp);
 /// Of the film, or its part that is rendered: WxH.
 std::string size_name(const FilmSettings& film);
 

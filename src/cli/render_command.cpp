@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "cli/output.h"
+#include "cli/replay.h"
 #include "cli/terminal.h"
 #include "core/log.h"
 #include "render/method.h"
@@ -18,7 +19,9 @@ void run(const RenderCommand& command) {
   const Sampler sampler = command.render.sampler(method.layout);
   const std::vector<Aov> aovs = parse_aovs(command.render.aov);
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, &command.render));
-  const Budget budget = make_budget(command.render, tracer->scene(), method, common.seed);
+  Budget budget = make_budget(command.render, tracer->scene().sample_count);
+  if (!command.render.replay.empty())
+    budget.replay = Replay(command.render.replay).passes(method.name, common.seed, size_name(tracer->scene().film));
   const auto clock = start_clock();
 
   const TrainingOptions& training = command.training;
