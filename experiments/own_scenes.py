@@ -8,7 +8,7 @@ from tool import compare, crop, folder_of, own_scene, render_reference
 
 FILM = {"size": "160x90", "max_depth": 6}
 SIZES = {**FILM, "spp": 128, "runs": 5}
-# Where Real NVP misses a caustic, its samples weigh up to 1 / this many times what a uniform one does.
+# Where Real NVP misses a caustic or a highlight in motion, its samples weigh up to 1 / this many times what a uniform one does.
 SHARE = {"uniform": 0.3}
 WARPS_4D = ["kdtree:film+bounce1", "realnvp:film+bounce1"]
 
@@ -42,7 +42,7 @@ def coins(epps=(1, 4, 64)):
 
 def billiards():
     """A break shot with balls in motion, epp-16: 4D beats plain path tracing; in 3D (film and time), where the samples fall."""
-    scene, options = own_scene("billiards"), {**SIZES, "epp": 16}
+    scene, options = own_scene("billiards"), {**SIZES, **SHARE, "epp": 16}
     against = render_reference("billiards", scene, 512, "field", objective="mse", **FILM)
     blurred = ["kdtree:film+time", "realnvp:film+time"]
     methods = ["none", "uniform:film+bounce1", *WARPS_4D, "uniform:film+time", *blurred]
