@@ -22,13 +22,14 @@ struct Vertices {
   explicit Vertices(std::uint64_t seed) {
     for (std::size_t i = 0; i < kVertices; ++i) {
       const std::uint64_t key = sample_key(seed, i);
-      std::array<float, 13> c;
+      VertexValues c;
       for (std::uint32_t k = 0; k < 3; ++k) c[k] = sample_float(key, k), c[9 + k] = 0.5f;
       const auto side = static_cast<std::size_t>(sample_float(key, 3) * 6);
       for (std::size_t k = 0; k < 3; ++k) c[3 + k] = 0, c[6 + k] = 0.5f;
       c[3 + side / 2] = side % 2 ? -1.0f : 1.0f;
       c[side / 2] = side % 2 ? 1.0f : 0.0f;
       c[12] = 1;
+      c[13] = c[0], c[14] = c[2];
       const auto kind = static_cast<std::uint8_t>(SurfaceKind::diffuse);
       const auto material = static_cast<std::uint32_t>(side);
       buffer.add(c, kind, material);

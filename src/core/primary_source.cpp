@@ -9,6 +9,8 @@ VertexContext VertexContext::from(std::size_t count) const {
   for (auto* arrays : {&rest.position, &rest.normal, &rest.wi, &rest.albedo})
     for (const float*& values : *arrays)
       if (values) values += count;
+  for (const float*& values : rest.film)
+    if (values) values += count;
   if (roughness) rest.roughness += count;
   if (kind) rest.kind += count;
   if (material) rest.material += count;

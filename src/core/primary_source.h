@@ -21,6 +21,7 @@ struct VertexContext {
   const float* roughness = nullptr;         ///< 0 delta ... 1 diffuse
   const std::uint8_t* kind = nullptr;       ///< SurfaceKind
   const std::uint32_t* material = nullptr;  ///< index of the BSDF in the scene
+  std::array<const float*, 2> film{};       ///< where the path began, in [0,1) of the whole film
   /// Luminance of what light that leaves the vertex is multiplied with on its way to the film, 1 / q included.
   const float* throughput = nullptr;
   /// For roulette only: the path goes on if its number is less than this. In (0,1).

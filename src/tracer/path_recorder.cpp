@@ -22,6 +22,7 @@ void PathRecorder::begin_bounce(std::uint16_t number, std::span<const std::uint3
     b.context[9 + k].assign(view.albedo[k], view.albedo[k] + n);
   }
   b.context[12].assign(view.roughness, view.roughness + n);
+  for (std::size_t k = 0; k < 2; ++k) b.context[13 + k].assign(view.film[k], view.film[k] + n);
   b.kind.assign(view.kind, view.kind + n);
   b.material.assign(view.material, view.material + n);
   for (auto& values : b.numbers) values.assign(n, 0.0f);
@@ -58,7 +59,14 @@ void PathRecorder::finish(VertexRecorder& recorder) {
     VertexRecords records;
     records.bounce = b.bounce;
     records.lanes = b.lanes;
-    records.context = {vec3(0), vec3(3), vec3(6), vec3(9), b.context[12].data(), b.kind.data(), b.material.data()};
+    records.context = {vec3(0),
+                       vec3(3),
+                       vec3(6),
+                       vec3(9),
+                       b.context[12].data(),
+                       b.kind.data(),
+                       b.material.data(),
+                       {b.context[13].data(), b.context[14].data()}};
     for (std::size_t d = 0; d < kBounceDimensions; ++d) records.numbers[d] = b.numbers[d].data();
     records.inv_q_light = b.inv_q_light.data();
     records.inv_q_scatter = b.inv_q_scatter.data();

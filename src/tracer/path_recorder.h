@@ -32,7 +32,7 @@ class PathRecorder {
   struct Bounce {
     std::uint16_t bounce = 0;
     std::vector<std::uint32_t> lanes, material;
-    std::array<std::vector<float>, 13> context;  // position, normal, wi, albedo, roughness
+    std::array<std::vector<float>, 15> context;  // position, normal, wi, albedo, roughness, film
     std::vector<std::uint8_t> kind;
     std::array<std::vector<float>, kBounceDimensions> numbers;
     std::vector<float> inv_q_light, inv_q_scatter;

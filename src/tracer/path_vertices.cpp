@@ -185,6 +185,8 @@ void PathLoop::fill_context() {
       }
       c.albedo.set(j, {a.x, a.y, a.z});
       const std::uint32_t lane = w.vertex_lanes[j];
+      c.film[0][j] = w.film.u0[lane];
+      c.film[1][j] = w.film.u1[lane];
       c.throughput[j] = luminance(w.beta.color(lane)) * w.weight[lane];
     }
   }

@@ -19,7 +19,7 @@ void* Arena::next() {
 
 VertexContext ContextArrays::view() const {
   return {position.pointers(), normal.pointers(), wi.pointers(), albedo.pointers(), roughness, kind, material,
-          throughput};
+          {film[0], film[1]},  throughput};
 }
 
 void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_t from) const {
@@ -30,6 +30,7 @@ void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_
   roughness[to] = source.roughness[from];
   kind[to] = source.kind[from];
   material[to] = source.material[from];
+  for (std::size_t a = 0; a < 2; ++a) film[a][to] = source.film[a][from];
   throughput[to] = source.throughput[from];
 }
 
@@ -44,7 +45,8 @@ void Workspace::resize(std::size_t n) {
   };
   const auto numbers = [&] { return DrawnNumbers{floats(), floats(), floats()}; };
   const auto contexts = [&] {
-    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices(), floats()};
+    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices(), {floats(), floats()},
+                         floats()};
   };
   beta = vectors();
   weight = floats();

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -47,6 +48,7 @@ struct ContextArrays {
   float* roughness;
   std::uint8_t* kind;
   std::uint32_t* material;
+  std::array<float*, 2> film;
   float* throughput;
   VertexContext view() const;
   void copy(std::size_t to, const ContextArrays& source, std::size_t from) const;

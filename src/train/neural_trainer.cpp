@@ -20,7 +20,7 @@ using nn::kBlock;
 /// A batch's blocks are dealt out to this many gradients, which are then added in their order: so the sum does not
 /// depend on threads.
 constexpr std::size_t kSlots = 8;
-/// Vertices kept of a pass, about: 80 bytes each.
+/// Vertices kept of a pass, about: 84 bytes each.
 constexpr double kMostVertices = 2e6;
 constexpr std::uint64_t kWeightStream = 0x6e657572616c0006u;
 constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
@@ -28,10 +28,8 @@ constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
 }  // namespace
 
 /// What a pass leaves of a vertex.
-struct NeuralTrainer::Vertex {
-  std::array<float, 13> context;  // position, normal, wi, albedo, roughness
-  std::uint32_t material;
-  std::uint8_t kind;
+struct NeuralTrainer::Example {
+  Vertex vertex;
   std::array<std::uint16_t, 2> bin;  // of its numbers: light, scatter
   std::array<float, 2> weight;
 };
@@ -74,7 +72,7 @@ class NeuralTrainer::Recorder final : public VertexRecorder {
   }
 
   std::unique_ptr<VertexRecorder> field_recorder;
-  std::vector<Vertex> vertices;
+  std::vector<Example> examples;
   double seen = 0;
 
  private:
@@ -97,20 +95,12 @@ class NeuralTrainer::Recorder final : public VertexRecorder {
       if (sample_float(sample_key(bits(3) << 32 | bits(4), bits(5)), x) * m_level >= sum) return;
       for (float& w : weight) w *= m_level / sum;
     }
-    Vertex v;
-    for (std::size_t a = 0; a < 3; ++a) {
-      v.context[a] = records.context.position[a][i];
-      v.context[3 + a] = records.context.normal[a][i];
-      v.context[6 + a] = records.context.wi[a][i];
-      v.context[9 + a] = records.context.albedo[a][i];
-    }
-    v.context[12] = records.context.roughness[i];
-    v.material = records.context.material[i];
-    v.kind = records.context.kind[i];
+    Example v;
+    v.vertex = Vertex(records.context, i);
     v.bin = {static_cast<std::uint16_t>(m_grids.light.bin(u[0][i], u[1][i], u[2][i])),
              static_cast<std::uint16_t>(m_grids.grid(VertexNumbers::scatter, kind).bin(u[3][i], u[4][i], u[5][i]))};
     v.weight = weight;
-    vertices.push_back(v);
+    examples.push_back(v);
   }
 
   const FieldGrids& m_grids;
@@ -158,18 +148,18 @@ std::unique_ptr<VertexRecorder> NeuralTrainer::make_recorder() const {
 void NeuralTrainer::merge(VertexRecorder& recorder) {
   auto& r = static_cast<Recorder&>(recorder);
   m_field_trainer.merge(*r.field_recorder);
-  m_vertices.insert(m_vertices.end(), r.vertices.begin(), r.vertices.end());
+  m_examples.insert(m_examples.end(), r.examples.begin(), r.examples.end());
   m_seen += r.seen;
-  r.vertices.clear();
+  r.examples.clear();
   r.seen = 0;
 }
 
 void NeuralTrainer::find_box() {
   // All but the outermost hundredth: a ground that reaches to the horizon would leave no detail to the rest.
-  std::vector<float> values(m_vertices.size());
+  std::vector<float> values(m_examples.size());
   float longest = 0;
   for (std::size_t a = 0; a < 3; ++a) {
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = m_vertices[i].context[a];
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = m_examples[i].vertex.values[a];
     const auto quantile = [&](double share) {
       const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
       std::nth_element(values.begin(), at, values.end());
@@ -190,11 +180,11 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
   const auto blocks = static_cast<std::size_t>(m_settings.batch / kBlock);
   alignas(64) std::array<float, kNodeFeatures> h, d_h;
   for (std::size_t b = slot * blocks / kSlots; b < (slot + 1) * blocks / kSlots; ++b) {
-    const auto vertex = [&](std::size_t k) -> const Vertex& {
-      return m_vertices[(first + (b * kBlock + k) * stride) % m_vertices.size()];
+    const auto example = [&](std::size_t k) -> const Example& {
+      return m_examples[(first + (b * kBlock + k) * stride) % m_examples.size()];
     };
     s.context.clear();
-    for (std::size_t k = 0; k < kBlock; ++k) s.context.add(vertex(k).context, vertex(k).kind, vertex(k).material);
+    for (std::size_t k = 0; k < kBlock; ++k) s.context.add(example(k).vertex);
     const VertexContext context = s.context.view();
     m_field->locate(context, kBlock, s.cells.data());
     network.encode(m_box, context, 0, kBlock, s.x.data());
@@ -202,14 +192,14 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
     trunk.forward(m_packed.data(), s.x.data(), s.activations.data(), s.h.data());
     nn::transpose(kNodeFeatures, s.h.data(), s.transposed_h.data());
     for (std::size_t k = 0; k < kBlock; ++k) {
-      const Vertex& v = vertex(k);
+      const Example& v = example(k);
       for (std::size_t f = 0; f < kNodeFeatures; f += 16)
         std::copy_n(s.transposed_h.data() + f * kBlock + k * 16, 16, h.data() + f);
       d_h = {};
       for (const VertexNumbers which : kBoth) {
         const auto w = static_cast<std::size_t>(which);
         if (!(v.weight[w] > 0)) continue;
-        const std::size_t head = VertexNetwork::head_of(which, static_cast<SurfaceKind>(v.kind));
+        const std::size_t head = VertexNetwork::head_of(which, static_cast<SurfaceKind>(v.vertex.kind));
         const std::size_t at = network.first_of_head(head);
         train_nodes(network.tree(head), m_parameters.data() + at, m_transposed_head[head],
                     m_field->density(which, s.cells[k]), h.data(), v.bin[w], v.weight[w], gradients + at, d_h.data());
@@ -244,7 +234,7 @@ void NeuralTrainer::step(std::size_t first, std::size_t stride, double rate) {
 }
 
 void NeuralTrainer::train() {
-  const std::size_t n = m_vertices.size(), batch = static_cast<std::size_t>(m_settings.batch);
+  const std::size_t n = m_examples.size(), batch = static_cast<std::size_t>(m_settings.batch);
   if (n < batch) return;
   if (m_steps == 0) find_box();
   // Each once, or twice where there are few.
@@ -271,7 +261,7 @@ void NeuralTrainer::fit_field() {
 
 std::shared_ptr<const Neural> NeuralTrainer::fit() {
   if (m_field) train();
-  m_vertices.clear();
+  m_examples.clear();
   fit_field();
   // The next pass is as large as all before it; the two w of a vertex are 1 on average.
   const double wanted = std::max(static_cast<double>(m_settings.min_visits), m_settings.visits * m_seen);

@@ -29,7 +29,7 @@ class NeuralTrainer final : public VertexTrainer {
 
  private:
   class Recorder;
-  struct Vertex;
+  struct Example;
   struct Means;
   struct Scratch;
 
@@ -52,9 +52,9 @@ class NeuralTrainer final : public VertexTrainer {
   // As they were before this pass: recorders use them while batches are merged.
   std::shared_ptr<const Field> m_field;
   std::shared_ptr<const Means> m_means;
-  double m_level = 0;              // a vertex of so much w is kept for sure
-  std::vector<Vertex> m_vertices;  // of this pass
-  double m_seen = 0;               // vertices of all passes
+  double m_level = 0;               // a vertex of so much w is kept for sure
+  std::vector<Example> m_examples;  // of this pass
+  double m_seen = 0;                // vertices of all passes
 };
 
 }  // namespace warpath

@@ -21,7 +21,7 @@ struct Batch {
   explicit Batch(std::uint64_t seed) {
     for (std::size_t i = 0; i < kBatch; ++i) {
       const std::uint64_t key = sample_key(seed, i);
-      std::array<float, 13> values{};
+      VertexValues values{};
       values[0] = sample_float(key, 10);
       values[2] = sample_float(key, 11);
       values[4] = values[12] = 1;

@@ -20,7 +20,7 @@ inline VertexContextBuffer random_vertices() {
   constexpr std::array kinds{SurfaceKind::diffuse, SurfaceKind::mixed, SurfaceKind::delta, SurfaceKind::glossy};
   VertexContextBuffer vertices;
   for (std::size_t i = 0; i < kVertices; ++i) {
-    std::array<float, 13> values;
+    VertexValues values;
     for (std::uint32_t k = 0; k < values.size(); ++k) values[k] = sample_float(sample_key(11, i), k);
     for (std::size_t k = 3; k < 6; ++k) values[k] = 0;
     values[3 + i % 3] = i % 2 ? 1.0f : -1.0f;
