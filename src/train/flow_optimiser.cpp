@@ -24,10 +24,12 @@ FlowObjective initial_objective(const FlowTraining& settings, const ExampleBlock
 
 }  // namespace
 
-void ExampleBlocks::resize(std::size_t examples_, std::size_t dims_) {
+void ExampleBlocks::resize(std::size_t examples_, std::size_t dims_, std::size_t context_rows_) {
   examples = examples_;
   count = (examples + kBlock - 1) / kBlock;
   dims = dims_;
+  context_rows = context_rows_;
+  context.assign(count * context_rows * kBlock, 0.0f);
   y.assign(count * dims * kBlock, 0.5);
   weight.assign(count * kBlock, 0.0f);
   target = weight;
@@ -74,9 +76,9 @@ double FlowOptimiser::fused_pass(const ExampleBlocks& batch, std::size_t slots) 
   parallel(slots, [&](std::size_t slot) {
     const std::size_t first = slot * batch.count / slots, end = (slot + 1) * batch.count / slots;
     for (std::size_t b = first; b < end; ++b)
-      loss[slot] +=
-          m_flow.train_block(m_packed, batch.block_y(b), batch.block_weight(b), batch.block_target(b), m_objective,
-                             m_gradients.data() + slot * m_parameters.size(), b > first, m_scratch[slot].data());
+      loss[slot] += m_flow.train_block(
+          m_packed, batch.block_y(b), batch.block_context(b), batch.block_weight(b), batch.block_target(b), m_objective,
+          m_gradients.data() + slot * m_parameters.size(), b > first, m_scratch[slot].data());
   });
   return std::accumulate(loss.begin(), loss.end(), 0.0);
 }

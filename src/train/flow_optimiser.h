@@ -12,13 +12,16 @@ namespace warpath {
 
 /// Weighted examples as blocks of dims x nn::kBlock doubles; what is left of the last block weighs nothing.
 struct ExampleBlocks {
-  std::size_t examples = 0, count = 0, dims = 0;  ///< count: of blocks
+  std::size_t examples = 0, count = 0, dims = 0, context_rows = 0;  ///< count: of blocks
   nn::AlignedVector<double> y;
   nn::AlignedVector<float> weight, target;  ///< target: g, in units of its mean over all candidates
+  nn::AlignedVector<float> context;         ///< what the flow is conditioned on: count x context_rows x kBlock
 
-  void resize(std::size_t examples_, std::size_t dims_);
+  void resize(std::size_t examples_, std::size_t dims_, std::size_t context_rows_ = 0);
   void set(std::size_t i, std::span<const float> example, float w, float g);
   const double* block_y(std::size_t b) const { return y.data() + b * dims * nn::kBlock; }
+  const float* block_context(std::size_t b) const { return context.data() + b * context_rows * nn::kBlock; }
+  float* block_context(std::size_t b) { return context.data() + b * context_rows * nn::kBlock; }
   const float* block_weight(std::size_t b) const { return weight.data() + b * nn::kBlock; }
   const float* block_target(std::size_t b) const { return target.data() + b * nn::kBlock; }
 };

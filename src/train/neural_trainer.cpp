@@ -179,6 +179,8 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
   std::fill_n(gradients, m_parameters.size(), 0.0f);
   const auto blocks = static_cast<std::size_t>(m_settings.batch / kBlock);
   alignas(64) std::array<float, kNodeFeatures> h, d_h;
+  std::array<std::uint32_t, kBlock> vertices;
+  std::iota(vertices.begin(), vertices.end(), 0u);
   for (std::size_t b = slot * blocks / kSlots; b < (slot + 1) * blocks / kSlots; ++b) {
     const auto example = [&](std::size_t k) -> const Example& {
       return m_examples[(first + (b * kBlock + k) * stride) % m_examples.size()];
@@ -187,7 +189,7 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
     for (std::size_t k = 0; k < kBlock; ++k) s.context.add(example(k).vertex);
     const VertexContext context = s.context.view();
     m_field->locate(context, kBlock, s.cells.data());
-    network.encode(m_box, context, 0, kBlock, s.x.data());
+    encode_vertices(m_box, network.shape().position_bins, context, vertices, s.x.data());
     nn::transpose(trunk.inputs(), s.x.data(), s.transposed_x.data());
     trunk.forward(m_packed.data(), s.x.data(), s.activations.data(), s.h.data());
     nn::transpose(kNodeFeatures, s.h.data(), s.transposed_h.data());

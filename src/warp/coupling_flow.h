@@ -34,6 +34,7 @@ class CouplingFlow {
   virtual std::size_t first_parameter(std::size_t coupling) const = 0;
   virtual std::vector<ParameterView> views() const = 0;
   virtual std::size_t multiply_adds() const = 0;  ///< of the networks, for one sample forward
+  virtual int context_rows() const { return 0; }  ///< rows that its networks see besides, which condition the density
   /// Parameters of the identity.
   virtual nn::AlignedVector<float> initial(std::uint64_t seed) const = 0;
 
@@ -56,9 +57,9 @@ class CouplingFlow {
   /// The loss over one block, see block_loss, and its gradient. y: dims x kBlock doubles; weight: kBlock, 0 for samples
   /// that only fill the block; target: kBlock, g of each, may be null with Loss::likelihood. gradients:
   /// parameter_count(), layout as the parameters, of the weights as they are packed (see unfold), padding between
-  /// tensors untouched; it is added to what is there if `accumulate`.
-  virtual double train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                             const FlowObjective& objective, float* gradients, bool accumulate,
+  /// tensors untouched; it is added to what is there if `accumulate`. context: context_rows() x kBlock.
+  virtual double train_block(const PackedParameters& packed, const double* y, const float* context, const float* weight,
+                             const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
                              float* scratch) const = 0;
   /// Turns one coupling's gradients of packed weights into those of the parameters, in place. Both arrays whole.
   virtual void unfold(std::size_t coupling, const float* parameters, float* gradients) const = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include "core/tensor_file.h"
 #include "nn/dense.h"
@@ -50,9 +51,11 @@ void Neural::locate(const VertexContext& context, std::size_t n, std::uint32_t* 
         *transposed = h + rows(kNodeFeatures);
   const Scratch<std::uint32_t> cells(n);
   m_field->locate(context, n, cells.data());
+  std::array<std::uint32_t, kBlock> vertices;
   for (std::size_t first = 0; first < n; first += kBlock) {
     const std::size_t count = std::min<std::size_t>(kBlock, n - first);
-    m_network->encode(m_box, context, first, count, x);
+    std::iota(vertices.begin(), vertices.end(), static_cast<std::uint32_t>(first));
+    encode_vertices(m_box, m_network->shape().position_bins, context, std::span(vertices).first(count), x);
     trunk.infer(m_packed.data(), x, hidden, h);
     nn::transpose(kNodeFeatures, h, transposed);
     for (std::size_t s = 0; s < count; ++s) {

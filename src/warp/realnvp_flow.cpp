@@ -211,8 +211,9 @@ std::size_t Flow::training_scratch_count() const {
          ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
 }
 
-double Flow::train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                         const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const {
+double Flow::train_block(const PackedParameters& packed, const double* y, const float* /*context*/, const float* weight,
+                         const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
+                         float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
   const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };

@@ -47,8 +47,9 @@ class Flow final : public CouplingFlow {
                float* scratch) const override;
 
   std::size_t training_scratch_count() const override;
-  double train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                     const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const override;
+  double train_block(const PackedParameters& packed, const double* y, const float* context, const float* weight,
+                     const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
+                     float* scratch) const override;
   void unfold(std::size_t coupling, const float* parameters, float* gradients) const override;
 
   /// What a coupling's networks see: v (dims x kBlock) -> x (inputs x kBlock).

@@ -140,10 +140,10 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
       m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
   Floats target(kBlock);
   for (std::size_t s = 0; s < kBlock; ++s) target[s] = 3 * sample_float(10, static_cast<std::uint32_t>(s));
-  const double loss = m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(),
-                                         false, scratch.data());
+  const double loss = m_flow.train_block(packed, m_y.data(), nullptr, weight.data(), target.data(), objective,
+                                         gradients.data(), false, scratch.data());
   const Floats once(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(m_parameters.size()));
-  m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(), true,
+  m_flow.train_block(packed, m_y.data(), nullptr, weight.data(), target.data(), objective, gradients.data(), true,
                      scratch.data());
   for (std::size_t i = 0; i < once.size(); ++i)
     ASSERT_NEAR(gradients[i], 2 * once[i], 1e-4f * (1 + std::abs(once[i]))) << i;

@@ -50,7 +50,8 @@ std::vector<Split> splits(int dims, const SplineSettings& settings) {
 
 }  // namespace
 
-Flow::Flow(int dims, const SplineSettings& settings) : m_dims(dims), m_settings(settings) {
+Flow::Flow(int dims, const SplineSettings& settings, int context_rows)
+    : m_dims(dims), m_context_rows(context_rows), m_settings(settings) {
   if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
   if (settings.bins < 2 || settings.bins > kMostBins)
     throw ConfigError(fmt::format("bins {}: must be 2 to {}", settings.bins, kMostBins));
@@ -66,10 +67,11 @@ Flow::Flow(int dims, const SplineSettings& settings) : m_dims(dims), m_settings(
                                                 all[before].moved.end()) != split.kept.end();
     coupling.kept = std::move(split.kept);
     coupling.moved = std::move(split.moved);
-    // A single dimension has nothing to be conditioned on: its network has no inputs.
-    coupling.net = nn::ResidualNet(static_cast<int>(coupling.kept.size()) * encoded_rows(settings.encoding_bins),
-                                   settings.width, settings.blocks,
-                                   static_cast<int>(coupling.moved.size()) * head_rows(settings.bins), nn::Norm::none);
+    // A single dimension without a context has nothing to be conditioned on: its network has no inputs.
+    const int kept = static_cast<int>(coupling.kept.size());
+    coupling.net =
+        nn::ResidualNet(context_rows + kept * encoded_rows(settings.encoding_bins), settings.width, settings.blocks,
+                        static_cast<int>(coupling.moved.size()) * head_rows(settings.bins), nn::Norm::none);
     coupling.parameters = std::exchange(m_parameters, m_parameters + coupling.net.parameter_count());
     coupling.packed = std::exchange(m_packed, m_packed + coupling.net.packed_count());
     coupling.packed_back = std::exchange(m_packed_back, m_packed_back + coupling.net.packed_back_count());
@@ -123,10 +125,14 @@ void Flow::pack_coupling(std::size_t c, const float* parameters, PackedParameter
     coupling.net.pack_back(parameters + coupling.parameters, packed.back.data() + coupling.packed_back);
 }
 
+void Flow::put_context(const float* context, float* x) const {
+  if (m_context_rows > 0) std::copy_n(context, m_context_rows * kBlock, x);
+}
+
 void Flow::encode_kept(const Coupling& coupling, const float* v, float* x) const {
   for (std::size_t k = 0; k < coupling.kept.size(); ++k)
     encode(m_settings.encoding_bins, row(v, coupling.kept[k]),
-           row(x, static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)));
+           row(x, m_context_rows + static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)));
 }
 
 // Density in doubles, heads, numbers to encode, inputs, and what ResidualNet::infer needs.
@@ -141,15 +147,18 @@ void Flow::condition(const Coupling& coupling, const PackedParameters& packed, c
   float* const rest = row(x, m_most_inputs);
   for (std::size_t k = 0; k < coupling.kept.size(); ++k) {
     narrow(row(v, coupling.kept[k]), narrowed);
-    encode(m_settings.encoding_bins, narrowed, row(x, static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)));
+    encode(m_settings.encoding_bins, narrowed,
+           row(x, m_context_rows + static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)));
   }
   coupling.net.infer(packed.forward.data() + coupling.packed, x, rest, heads);
 }
 
-void Flow::forward(const PackedParameters& packed, const double* z, double* y, double* log_det, float* scratch) const {
+void Flow::forward(const PackedParameters& packed, const double* z, const float* context, double* y, double* log_det,
+                   float* scratch) const {
   double* const density = reinterpret_cast<double*>(scratch);
   float* const heads = row(scratch, 2);
   float* const rest = row(heads, m_most_outputs);
+  put_context(context, row(rest, 1));
   if (y != z) std::copy_n(z, m_dims * kBlock, y);
   std::fill_n(density, kBlock, 1.0);
   std::fill_n(log_det, kBlock, 0.0);
@@ -163,10 +172,12 @@ void Flow::forward(const PackedParameters& packed, const double* z, double* y, d
   for (int i = 0; i < kBlock; ++i) log_det[i] = -log_det[i];
 }
 
-void Flow::inverse(const PackedParameters& packed, const double* y, double* z, double* log_det, float* scratch) const {
+void Flow::inverse(const PackedParameters& packed, const double* y, const float* context, double* z, double* log_det,
+                   float* scratch) const {
   double* const density = reinterpret_cast<double*>(scratch);
   float* const heads = row(scratch, 2);
   float* const rest = row(heads, m_most_outputs);
+  put_context(context, row(rest, 1));
   if (z != y) std::copy_n(y, m_dims * kBlock, z);
   std::fill_n(density, kBlock, 1.0);
   std::fill_n(log_det, kBlock, 0.0);
@@ -189,8 +200,9 @@ std::size_t Flow::training_scratch_count() const {
          ((couplings + 2) * dims + (couplings + 1) * m_most_outputs + 3 * inputs + 3) * kBlock;
 }
 
-double Flow::train_block(const PackedParameters& packed, const double* y, const float* weight, const float* target,
-                         const FlowObjective& objective, float* gradients, bool accumulate, float* scratch) const {
+double Flow::train_block(const PackedParameters& packed, const double* y, const float* context, const float* weight,
+                         const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
+                         float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
   const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const int bins = m_settings.bins, rows = head_rows(bins), encoded = encoded_rows(m_settings.encoding_bins);
@@ -207,6 +219,7 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
   float* const activations = scratch;
   float* const rest = activations + m_activations;
 
+  put_context(context, x);
   // y -> z, keeping everything. v + c dims: the numbers above coupling c, v itself: those of z.
   float* now = row(v, couplings * dims);
   std::fill_n(log_q, kBlock, 0.0);
@@ -238,8 +251,8 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
                           gradients + coupling.parameters, accumulate, coupling.sees_moved ? d_x : nullptr, false,
                           rest);
     for (std::size_t k = 0; coupling.sees_moved && k < coupling.kept.size(); ++k)
-      encode_backward(m_settings.encoding_bins, row(now, coupling.kept[k]), row(d_x, static_cast<int>(k) * encoded),
-                      row(d_v, coupling.kept[k]));
+      encode_backward(m_settings.encoding_bins, row(now, coupling.kept[k]),
+                      row(d_x, m_context_rows + static_cast<int>(k) * encoded), row(d_v, coupling.kept[k]));
   }
   return loss;
 }

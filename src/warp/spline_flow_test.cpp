@@ -19,6 +19,7 @@ struct Case {
   std::string target;
   SplineSettings::Masks masks = SplineSettings::Masks::binary;
   int couplings = 3;
+  int context_rows = 0;
 };
 
 SplineSettings settings(const Case& c) {
@@ -49,9 +50,10 @@ class SplineFlowTest : public testing::TestWithParam<Case> {
  protected:
   Case m_case = GetParam();
   nn::ForceSimdTarget m_target{m_case.target};
-  Flow m_flow{m_case.dims, settings(m_case)};
+  Flow m_flow{m_case.dims, settings(m_case), m_case.context_rows};
   Floats m_parameters = random_parameters(m_flow);
   Doubles m_y = block_of_y(m_case.dims);
+  Floats m_context = block_of_context(m_case.context_rows);
 
   /// A block of y that are floats, so that the training pass sees the same numbers; some near the border.
   static Doubles block_of_y(int dims) {
@@ -62,6 +64,18 @@ class SplineFlowTest : public testing::TestWithParam<Case> {
       if (i % 31 == 8 && i % 29 != 7) y[i] = 1 - 0x1p-20;
     }
     return y;
+  }
+  static Floats block_of_context(int rows) {
+    Floats context(static_cast<std::size_t>(rows * kBlock));
+    for (std::size_t i = 0; i < context.size(); ++i)
+      context[i] = 2 * sample_float(23, static_cast<std::uint32_t>(i)) - 1;
+    return context;
+  }
+  std::vector<double> context(std::size_t s) const {
+    std::vector<double> rows;
+    for (std::size_t r = 0; r < static_cast<std::size_t>(m_case.context_rows); ++r)
+      rows.push_back(static_cast<double>(m_context[r * kBlock + s]));
+    return rows;
   }
   std::vector<double> sample(std::size_t s) const {
     std::vector<double> v;
@@ -82,12 +96,17 @@ std::vector<Case> cases() {
     // No gradients go through the first layer, some through the second.
     all.push_back({4, 8, 5, 1, 0.1, target, SplineSettings::Masks::autoregressive, 1});
     all.push_back({3, 8, 5, 0, 0, target, SplineSettings::Masks::autoregressive, 2});
+    // Conditioned; a single dimension, too.
+    all.push_back({3, 8, 5, 1, 0.1, target, SplineSettings::Masks::autoregressive, 1, 7});
+    all.push_back({4, 6, 3, 0, 0, target, SplineSettings::Masks::binary, 3, 20});
+    all.push_back({1, 6, 3, 1, 0.2, target, SplineSettings::Masks::binary, 2, 3});
   }
   return all;
 }
 INSTANTIATE_TEST_SUITE_P(Flows, SplineFlowTest, testing::ValuesIn(cases()), [](const auto& p) {
   const bool binary = p.param.masks == SplineSettings::Masks::binary;
-  return fmt::format("{}_{}D_{}", p.param.target, p.param.dims, binary ? "binary" : "autoregressive");
+  return fmt::format("{}_{}D_{}{}", p.param.target, p.param.dims, binary ? "binary" : "autoregressive",
+                     p.param.context_rows > 0 ? "_conditioned" : "");
 });
 
 TEST_P(SplineFlowTest, DensityAgreesWithTheReference) {
@@ -95,11 +114,11 @@ TEST_P(SplineFlowTest, DensityAgreesWithTheReference) {
   m_flow.pack(m_parameters.data(), packed, false);
   Doubles z(m_y.size()), log_q(kBlock);
   Floats scratch(m_flow.scratch_count());
-  m_flow.inverse(packed, m_y.data(), z.data(), log_q.data(), scratch.data());
+  m_flow.inverse(packed, m_y.data(), m_context.data(), z.data(), log_q.data(), scratch.data());
   const Reference reference(m_flow, {m_parameters.begin(), m_parameters.end()});
   double most = 0;
   for (std::size_t s = 0; s < kBlock; ++s) {
-    const double exact = reference.log_density(sample(s));
+    const double exact = reference.log_density(sample(s), context(s));
     // Each spline's bins are differences of float knots: relative errors of 1e-7 times the number of bins.
     EXPECT_NEAR(log_q[s], exact, 2e-6 * (8 + m_case.bins) * m_case.dims) << s;
     most = std::max(most, std::abs(exact));
@@ -112,8 +131,8 @@ TEST_P(SplineFlowTest, ForwardUndoesInverse) {
   m_flow.pack(m_parameters.data(), packed, false);
   Doubles z(m_y.size()), y(m_y.size()), there(kBlock), back(kBlock);
   Floats scratch(m_flow.scratch_count());
-  m_flow.inverse(packed, m_y.data(), z.data(), there.data(), scratch.data());
-  m_flow.forward(packed, z.data(), y.data(), back.data(), scratch.data());
+  m_flow.inverse(packed, m_y.data(), m_context.data(), z.data(), there.data(), scratch.data());
+  m_flow.forward(packed, z.data(), m_context.data(), y.data(), back.data(), scratch.data());
   for (std::size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(y[i], m_y[i], 1e-6) << i;
   for (std::size_t s = 0; s < kBlock; ++s) EXPECT_NEAR(there[s], -back[s], 1e-5) << s;
 }
@@ -133,11 +152,11 @@ TEST_P(SplineFlowTest, GradientsAgreeWithFiniteDifferences) {
   gradients.back() = 5;
   const FlowObjective objective{m_case.uniform > 0 ? Loss::variance : Loss::likelihood, m_case.uniform,
                                 m_case.uniform > 0 ? 50.0 : 1.0};  // nothing is cut off
-  const double loss = m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(),
-                                         false, scratch.data());
+  const double loss = m_flow.train_block(packed, m_y.data(), m_context.data(), weight.data(), target.data(), objective,
+                                         gradients.data(), false, scratch.data());
   const Floats once(gradients.begin(), gradients.begin() + static_cast<std::ptrdiff_t>(m_parameters.size()));
-  m_flow.train_block(packed, m_y.data(), weight.data(), target.data(), objective, gradients.data(), true,
-                     scratch.data());
+  m_flow.train_block(packed, m_y.data(), m_context.data(), weight.data(), target.data(), objective, gradients.data(),
+                     true, scratch.data());
   for (std::size_t i = 0; i < once.size(); ++i)
     ASSERT_NEAR(gradients[i], 2 * once[i], 1e-4f * (1 + std::abs(once[i]))) << i;
   EXPECT_EQ(gradients.back(), 5.0f) << "wrote too far";
@@ -149,7 +168,7 @@ TEST_P(SplineFlowTest, GradientsAgreeWithFiniteDifferences) {
     reference.parameters()[i] += shift;
     double sum = 0;
     for (std::size_t s = 0; s < 50; ++s) {
-      const double log_q = reference.log_density(sample(s));
+      const double log_q = reference.log_density(sample(s), context(s));
       const double w = static_cast<double>(weight[s]), mixed = (1 - m_case.uniform) * std::exp(log_q) + m_case.uniform;
       sum += w * (m_case.uniform > 0 ? static_cast<double>(target[s]) / mixed : -log_q);
     }

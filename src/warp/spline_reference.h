@@ -43,12 +43,12 @@ class Reference {
   Reference(const Flow& flow, std::vector<double> parameters) : m_flow(flow), p(std::move(parameters)) {}
   std::vector<double>& parameters() { return p; }
 
-  double log_density(std::vector<double> y) const {
+  double log_density(std::vector<double> y, const std::vector<double>& context = {}) const {
     const SplineSettings& settings = m_flow.settings();
     double log_q = 0;
     for (std::size_t c = m_flow.couplings().size(); c-- > 0;) {
       const Coupling& coupling = m_flow.couplings()[c];
-      std::vector<double> inputs;
+      std::vector<double> inputs = context;
       for (const int k : coupling.kept) {
         const double u = y[static_cast<std::size_t>(k)];
         inputs.push_back(2 * u - 1);

@@ -5,22 +5,16 @@
 #include "nn/residual_net.h"
 #include "warp/field.h"
 #include "warp/node_kernels.h"
+#include "warp/vertex_encoding.h"
 #include "warp/vertex_warp.h"
 #include "warpath/train.h"
 
 namespace warpath {
 
-/// Where vertices lie: what a VertexNetwork takes for the unit cube.
-struct VertexBox {
-  std::array<float, 3> low{0, 0, 0};
-  float scale = 1;  ///< 1 / longest side
-};
-
 /// A network that corrects the densities of a field by what the path knows at a vertex.
 ///
-/// It sees the position in a one-blob encoding [MMRGN19], the normal, the direction of the previous vertex and its
-/// reflection, roughness, albedo, kind of surface and material, and makes kNodeFeatures features of them. There is one
-/// NodeTree for the numbers of light sampling, and one for those of scattering at each of three kinds of surface.
+/// It sees vertices as encode_vertices shows them, and makes kNodeFeatures features of them. There is one NodeTree for
+/// the numbers of light sampling, and one for those of scattering at each of three kinds of surface.
 class VertexNetwork {
  public:
   static constexpr std::size_t kHeads = 4;
@@ -42,9 +36,6 @@ class VertexNetwork {
   std::size_t parameter_count() const { return m_first_of_head[kHeads]; }
   /// Nothing is corrected yet.
   nn::AlignedVector<float> initial(std::uint64_t key) const;
-
-  /// Encodes vertices [first, first + n), n <= kBlock. x: trunk().inputs() x kBlock.
-  void encode(const VertexBox& box, const VertexContext& context, std::size_t first, std::size_t n, float* x) const;
 
  private:
   NeuralShape m_shape;
