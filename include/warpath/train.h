@@ -62,6 +62,24 @@ struct SplineSettings : FlowTraining {
   enum class Masks { binary, autoregressive } masks = Masks::binary;
 };
 
+/// Settings of the conditional spline: flows over the numbers of a vertex, given what a path knows there. They learn
+/// while they render.
+struct ConditionalSplineSettings {
+  ConditionalSplineSettings() {
+    flow.masks = SplineSettings::Masks::autoregressive;
+    flow.couplings = 1;
+    flow.bins = flow.encoding_bins = 16;
+    flow.rate = 5e-3;
+  }
+  SplineSettings flow;  ///< shape, loss, step size and batch; max_steps and what follows it mean nothing here
+  int position_bins = 8, film_bins = 16;  ///< of one-blob encodings, along each axis
+  Layout numbers;                         ///< that are warped: bounce1.lobe+bounce1.dir, ...
+  double visits = 0.1;                    ///< examples trained on after a pass, over its vertices,
+  int min_visits = 1 << 17;               ///< and at least
+  double clip = 20;  ///< what comes back counts as so many times the brightness around it at most: in training only
+  int most_examples = 1 << 20;  ///< kept of all passes, drawn by what they brought; 96 bytes each
+};
+
 struct KdTreeSettings {
   enum class Target { mean, second_moment } target = Target::mean;  ///< density of a cell ~ mean g, or sqrt(E[g^2])
   /// cyclic: brightest cell first, in the middle, dimensions in turn, as in [GBBE18]; best: wherever a split gains most
@@ -114,6 +132,7 @@ struct TrainSettings {
   std::uint64_t seed = 0;
   RealNvpSettings realnvp;
   SplineSettings spline;
+  ConditionalSplineSettings conditional_spline;
   NeuralSettings neural;
   KdTreeSettings kdtree;
   GridSettings grid;

@@ -6,6 +6,7 @@
 #include "core/rng.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
+#include "train/conditional_spline_trainer.h"
 #include "train/field_trainer.h"
 #include "train/neural_trainer.h"
 #include "train/train.h"
@@ -144,6 +145,13 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     const WarpFile file = load_warp(method.file);
     prepared.proposal = file.proposal;
     prepared.guide.warp = file.vertex_warp;
+    return prepared;
+  }
+  if (method.family == "spline" && is_conditional(method.layout)) {
+    ConditionalSplineSettings settings = m_settings.conditional_spline;
+    settings.numbers = method.layout;
+    if (!m_init.empty()) throw ConfigError(fmt::format("--init {}: a conditional spline starts anew", m_init.string()));
+    prepared.guide.trainer = std::make_unique<ConditionalSplineTrainer>(settings, m_settings.uniform, m_settings.seed);
     return prepared;
   }
   if (method.family == "neural") {

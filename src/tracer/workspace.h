@@ -32,7 +32,7 @@ class Arena {
   void* next();
 
   // With the pad, arrays of a power-of-two length do not all fall into the same cache sets.
-  static constexpr std::size_t kArrays = 144;
+  static constexpr std::size_t kArrays = 148;
   std::size_t m_stride = 0, m_used = 0, m_capacity = 0;
   std::unique_ptr<float[]> m_memory;
 };

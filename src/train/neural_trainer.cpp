@@ -155,20 +155,10 @@ void NeuralTrainer::merge(VertexRecorder& recorder) {
 }
 
 void NeuralTrainer::find_box() {
-  // All but the outermost hundredth: a ground that reaches to the horizon would leave no detail to the rest.
-  std::vector<float> values(m_examples.size());
-  float longest = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = m_examples[i].vertex.values[a];
-    const auto quantile = [&](double share) {
-      const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-      std::nth_element(values.begin(), at, values.end());
-      return *at;
-    };
-    m_box.low[a] = quantile(0.01);
-    longest = std::max(longest, quantile(0.99) - m_box.low[a]);
-  }
-  m_box.scale = longest > 0 ? 1 / longest : 1;
+  std::array<std::vector<float>, 3> positions;
+  for (std::size_t a = 0; a < 3; ++a)
+    for (const Example& example : m_examples) positions[a].push_back(example.vertex.values[a]);
+  m_box = box_around(std::move(positions));
 }
 
 void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::size_t stride) {

@@ -39,19 +39,22 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
     give(encoding_bins, result.realnvp.bins);
     give(rate, result.realnvp.rate);
   }
-  give(couplings, result.spline.couplings);
-  give(width, result.spline.width);
-  give(blocks, result.spline.blocks);
-  give(encoding_bins, result.spline.encoding_bins);
-  give(rate, result.spline.rate);
+  for (SplineSettings* spline : {&result.spline, &result.conditional_spline.flow}) {
+    give(couplings, spline->couplings);
+    give(width, spline->width);
+    give(blocks, spline->blocks);
+    give(encoding_bins, spline->encoding_bins);
+    give(bins, spline->bins);
+    give(rate, spline->rate);
+  }
   give(width, result.neural.width);
   give(blocks, result.neural.blocks);
   give(rate, result.neural.rate);
   give(batch, result.neural.batch);
-  give(bins, result.spline.bins);
   give(bins, result.grid.bins);
   const bool likelihood = is_second("loss", loss, "variance", "likelihood");
-  for (FlowTraining* flow : {static_cast<FlowTraining*>(&result.realnvp), static_cast<FlowTraining*>(&result.spline)}) {
+  for (FlowTraining* flow :
+       std::initializer_list<FlowTraining*>{&result.realnvp, &result.spline, &result.conditional_spline.flow}) {
     give(batch, flow->batch);
     give(jitter, flow->jitter);
     give(max_steps, flow->max_steps);

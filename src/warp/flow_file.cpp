@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "warp/load.h"
+#include "warp/spline_kernels.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -24,6 +25,31 @@ int load_int(const TensorFile& file, const std::string& prefix, const char* key,
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most)
     fail_load(file, prefix, fmt::format("{} \"{}\", not {} to {}", key, text, least, most));
   return value;
+}
+
+void save_settings(TensorFile& file, const std::string& prefix, const SplineSettings& s) {
+  auto& meta = file.metadata();
+  meta[prefix + "couplings"] = std::to_string(s.couplings);
+  meta[prefix + "width"] = std::to_string(s.width);
+  meta[prefix + "blocks"] = std::to_string(s.blocks);
+  meta[prefix + "bins"] = std::to_string(s.bins);
+  meta[prefix + "encoding_bins"] = std::to_string(s.encoding_bins);
+  meta[prefix + "masks"] = s.masks == SplineSettings::Masks::binary ? "binary" : "autoregressive";
+}
+
+SplineSettings load_spline_settings(const TensorFile& file, const std::string& prefix) {
+  SplineSettings s;
+  s.couplings = load_int(file, prefix, "couplings", 1, 1000);
+  s.width = load_int(file, prefix, "width", 16, 8192);
+  s.blocks = load_int(file, prefix, "blocks", 0, 100);
+  s.bins = load_int(file, prefix, "bins", 2, spline::kMostBins);
+  s.encoding_bins = load_int(file, prefix, "encoding_bins", 0, 256);
+  const std::string& masks = file.meta(prefix + "masks");
+  if (masks != "binary" && masks != "autoregressive")
+    fail_load(file, prefix, fmt::format("masks \"{}\", not binary or autoregressive", masks));
+  if (masks == "autoregressive") s.masks = SplineSettings::Masks::autoregressive;
+  if (s.width % 16 != 0) fail_load(file, prefix, fmt::format("width {}: not a multiple of 16", s.width));
+  return s;
 }
 
 void save_parameters(TensorFile& file, const std::string& prefix, const CouplingFlow& flow,

@@ -19,6 +19,23 @@ constexpr int kPlainInputs = 4 * 3 + 2;
 
 }  // namespace
 
+VertexBox box_around(std::array<std::vector<float>, 3> coordinates) {
+  VertexBox box;
+  float longest = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    std::vector<float>& values = coordinates[a];
+    const auto quantile = [&](double share) {
+      const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), at, values.end());
+      return *at;
+    };
+    box.low[a] = quantile(0.01);
+    longest = std::max(longest, quantile(0.99) - box.low[a]);
+  }
+  box.scale = longest > 0 ? 1 / longest : 1;
+  return box;
+}
+
 int encoded_vertex_rows(int position_bins) {
   return 3 * spline::encoded_rows(position_bins) + kPlainInputs + static_cast<int>(kKinds.size()) + kMaterialSigns;
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/primary_source.h"
 
@@ -13,6 +14,10 @@ struct VertexBox {
   std::array<float, 3> low{0, 0, 0};
   float scale = 1;  ///< 1 / longest side
 };
+
+/// A box around all but the outermost hundredth along each axis: a ground that reaches to the horizon would leave no
+/// detail to the rest. The same number of coordinates for each axis, at least one.
+VertexBox box_around(std::array<std::vector<float>, 3> coordinates);
 
 /// What networks see of a vertex, in rows of nn::kBlock numbers: the position in a one-blob encoding [MMRGN19] of
 /// `position_bins` along each axis, the normal, the direction of the previous vertex and its reflection, albedo,

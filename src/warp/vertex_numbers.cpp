@@ -24,6 +24,16 @@ void check_vertex_numbers(const Layout& numbers) {
   }
 }
 
+bool is_conditional(const Layout& numbers) {
+  if (numbers.dims() == 0) return false;
+  try {
+    check_vertex_numbers(numbers);
+    return true;
+  } catch (const ConfigError&) {
+    return false;
+  }
+}
+
 bool holds_vertex_numbers(const Layout& numbers, VertexNumbers which, std::uint16_t bounce) {
   return numbers.dims() == 0 ||
          numbers.contains({which == VertexNumbers::light ? GroupKind::light : GroupKind::lobe, bounce});

@@ -10,6 +10,8 @@ namespace warpath {
 /// Throws ConfigError unless the groups are those that a warp of vertices draws together:
 /// bounceK.light+bounceK.light_uv, bounceK.lobe+bounceK.dir.
 void check_vertex_numbers(const Layout& numbers);
+/// Whether they are such groups, and there are any: a warp over them is conditioned on what a path knows there.
+bool is_conditional(const Layout& numbers);
 /// Whether they hold those of a vertex; empty stands for all.
 bool holds_vertex_numbers(const Layout& numbers, VertexNumbers which, std::uint16_t bounce);
 /// Those of a saved warp, under "numbers". Throws FileError.
