@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <string>
 
 namespace warpath {
 
@@ -7,8 +8,9 @@ namespace warpath {
 struct PassRecord {
   int spp = 0;
   std::uint64_t batches = 0;  ///< begun before time was up, those of directly seen emission included
-  bool teaches = false;       ///< the warp learned from it
-  bool gave_up = false;       ///< after it the warp was given up, as it did not pay
+  bool teaches = false;       ///< warps learned from it
+  std::string drawn_by;       ///< of what `auto` may choose: the method whose warp drew it; empty: uniform numbers
+  std::string chosen;         ///< what `auto` chose after it; empty: nothing yet
 };
 
 }  // namespace warpath

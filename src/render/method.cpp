@@ -137,6 +137,26 @@ void PreparedMethod::add_candidates(ImageEstimator& estimator) const {
   }
 }
 
+std::unique_ptr<VertexTrainer> MethodTrainer::conditional_trainer(const Method& method) const {
+  if (method.family == "spline") {
+    ConditionalSplineSettings settings = m_settings.conditional_spline;
+    settings.numbers = method.layout;
+    return std::make_unique<ConditionalSplineTrainer>(settings, m_settings.uniform, m_settings.seed);
+  }
+  return nullptr;
+}
+
+std::vector<Contender> MethodTrainer::contenders(std::unique_ptr<VertexTrainer> field,
+                                                 std::shared_ptr<const VertexWarp> warp) const {
+  std::vector<Contender> all;
+  all.push_back({"field", std::move(field), 1.85, 0, std::move(warp)});
+  const auto add = [&](const char* name, double path_cost, double fit_cost) {
+    all.push_back({name, conditional_trainer(parse_method(name)), path_cost, fit_cost});
+  };
+  add("spline:bounce1.lobe+bounce1", 1.5, 6e4);
+  return all;
+}
+
 PreparedMethod MethodTrainer::prepare(const Method& method) {
   PreparedMethod prepared;
   if (method.family == "none") return prepared;
@@ -147,13 +167,14 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
     prepared.guide.warp = file.vertex_warp;
     return prepared;
   }
-  if (method.family == "spline" && is_conditional(method.layout)) {
-    ConditionalSplineSettings settings = m_settings.conditional_spline;
-    settings.numbers = method.layout;
-    if (!m_init.empty()) throw ConfigError(fmt::format("--init {}: a conditional spline starts anew", m_init.string()));
-    prepared.guide.trainer = std::make_unique<ConditionalSplineTrainer>(settings, m_settings.uniform, m_settings.seed);
-    return prepared;
-  }
+  if (is_conditional(method.layout))
+    if (auto trainer = conditional_trainer(method)) {
+      if (!m_init.empty())
+        throw ConfigError(
+            fmt::format("--init {}: {} starts anew; field can start from a field", m_init.string(), method.name));
+      prepared.guide.trainer = std::move(trainer);
+      return prepared;
+    }
   if (method.family == "neural") {
     NeuralSettings settings = m_settings.neural;
     settings.field = m_settings.field;
@@ -174,8 +195,10 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
       trainer->start_from(*field);
       prepared.guide.warp = field;
     }
-    prepared.guide.trainer = std::move(trainer);
-    prepared.guide.automatic = method.family == "auto";
+    if (method.family == "auto")
+      prepared.guide.contenders = contenders(std::move(trainer), std::move(prepared.guide.warp));
+    else
+      prepared.guide.trainer = std::move(trainer);
     return prepared;
   }
   TrainSettings settings = m_settings;

@@ -69,6 +69,10 @@ class MethodTrainer {
   /// chunk.
   Fit train_in_chunks(const Layout& layout, const TrainSettings& settings, const Proposal* init,
                       PreparedMethod& prepared);
+  /// What `auto` chooses from: the field at every vertex, which may know something already, and warps of the first hit,
+  /// which cost less.
+  std::vector<Contender> contenders(std::unique_ptr<VertexTrainer> field, std::shared_ptr<const VertexWarp> warp) const;
+  std::unique_ptr<VertexTrainer> conditional_trainer(const Method& method) const;
 
   std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;

@@ -1,12 +1,9 @@
 #include "render/render_loop.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "core/interrupt.h"
-#include "core/log.h"
 #include "core/stopwatch.h"
 
 namespace warpath {
@@ -15,89 +12,42 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-/// What a path costs with a warp at its vertices, over what one costs without, by count of operations: looking a vertex
-/// up, two densities, what half of the paths teach, and longer paths with more light to look for, against two rays, a
-/// BSDF and a light.
-constexpr double kVertexWarpCost = 1.85;
-/// The pass before which `auto` has seen enough of both ways: 8 samples per pixel of each.
-constexpr int kTrialSpp = 8;
-/// After its first pass, where it knows little yet, the warp is given up only if its error times cost is so much worse;
-/// where light is rare, deviations of few samples come out too small besides.
-constexpr double kStillLearns = 0.3;
-/// The pass before the second look, and how good the warp must be then: the plain pass that it is compared with was
-/// shorter, and looks better than it was.
-constexpr int kSecondLookSpp = 32;
-constexpr double kLearned = 0.5;
-/// The pass that begins here is drawn uniformly and teaches nothing where costs are measured: that is what a path costs
-/// without a warp.
-constexpr int kPlainCostSpp = 2;
-
-/// How `auto` chooses between uniform numbers and the warp at vertices: error of one sample times its cost, of the last
-/// pass before kTrialSpp, drawn uniformly, and of the first one after it, drawn by the warp, and again of one at
-/// kSecondLookSpp.
-class Trial {
- public:
-  /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
-  explicit Trial(bool by_clock) : m_by_clock(by_clock) {}
-
-  /// Whether the pass that begins at `done` samples per pixel is still drawn uniformly.
-  static bool is_plain(int done) { return done < kTrialSpp; }
-  /// Whether it teaches the warp.
-  bool teaches(int done) const { return !m_by_clock || done != kPlainCostSpp; }
-  /// Told of the pass that began at `done`; gives the warp up, and returns true, if it does not pay.
-  bool judge(const ImageEstimator& estimator, int done, double seconds_per_spp, Guide& guide) {
-    const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
-    if (is_plain(done)) {
-      m_plain_error = error;
-      if (done == kPlainCostSpp) m_plain_seconds = seconds_per_spp;
-      m_teaching_seconds = std::max(0.0, seconds_per_spp - m_plain_seconds);
-      return false;
-    }
-    // Passes double, and the last one teaches nothing: half of all paths do.
-    const double cost = m_by_clock ? (seconds_per_spp - m_teaching_seconds / 2) / m_plain_seconds : kVertexWarpCost;
-    const double gain = m_plain_error / (error * cost);
-    const bool settled = done >= kSecondLookSpp;
-    if (!settled && done > kTrialSpp) return false;
-    const bool pays = !(gain < (settled ? kLearned : kStillLearns));
-    const std::string choice = fmt::format(
-        "{}: a field at every vertex has {:.2f} x the efficiency, 1 / (error x cost), and its paths cost {:.2f} x as "
-        "much",
-        pays ? "field" : "plain path tracing", gain, cost);
-    log::info("auto: {}", choice);
-    if (!pays)
-      guide.give_up(choice);
-    else
-      guide.choice = choice;
-    if (settled) guide.automatic = false;
-    return !pays;
-  }
-
- private:
-  bool m_by_clock;
-  double m_plain_error = 0, m_plain_seconds = 0, m_teaching_seconds = 0;
-};
-
 /// Weight of a sample in the pass that begins at `done` samples per pixel, where passes learn: the first ones, drawn by
 /// a warp that knows little, are noisier. It must not depend on what samples bring, so it is a curve that lies near the
 /// reciprocals of the variances that were seen; the optimum is flat.
 float weight_of_pass(int done) { return 0.25f + 0.75f * static_cast<float>(done) / (static_cast<float>(done) + 6); }
 
-/// One pass; what it teaches goes into the guide if another is to follow.
-void add_pass(ImageEstimator& estimator, int spp, bool warped, bool teaches, float weight, Guide& guide,
-              const Progress& progress, const std::function<bool()>& stop) {
-  if (guide.empty()) return estimator.add_pass(spp, progress, stop);
-  const bool learns = guide.trainer && teaches;
-  const std::uint64_t before = estimator.cost().samples;
-  estimator.add_guided_pass(
-      spp, {warped ? guide.warp.get() : nullptr, learns ? guide.trainer.get() : nullptr, guide.objective, weight},
-      progress, stop);
-  if (!learns || g_interrupted) return;
-  const Stopwatch clock;
-  guide.warp = guide.trainer->warp();
-  guide.taught += estimator.cost().samples - before;
-  guide.fit_seconds += clock.wall();
-  guide.fit_cpu_seconds += clock.cpu();
-}
+/// Draws a pass, and lets who learns from it do so.
+class Passes {
+ public:
+  Passes(ImageEstimator& estimator, Guide& guide, bool by_clock) : m_estimator(estimator), m_guide(guide) {
+    if (!guide.contenders.empty()) m_automatic.emplace(std::move(guide.contenders), by_clock);
+  }
+  Automatic* automatic() { return m_automatic ? &*m_automatic : nullptr; }
+  bool online() const { return m_automatic || m_guide.trainer; }
+
+  void add(const PassRecord& pass, float weight, const Progress& progress, const std::function<bool()>& stop) {
+    if (!m_automatic && m_guide.empty()) return m_estimator.add_pass(pass.spp, progress, stop);
+    const VertexWarp* warp = m_automatic ? m_automatic->warp(pass) : m_guide.warp.get();
+    VertexLearner* learner = m_automatic ? m_automatic->learner(pass) : pass.teaches ? m_guide.trainer.get() : nullptr;
+    const std::uint64_t before = m_estimator.cost().samples;
+    m_estimator.add_guided_pass(pass.spp, {warp, learner, m_guide.objective, weight}, progress, stop);
+    if (!learner || g_interrupted) return;
+    const Stopwatch clock;
+    if (m_automatic)
+      m_automatic->fit(pass);
+    else
+      m_guide.warp = m_guide.trainer->warp();
+    m_guide.taught += m_estimator.cost().samples - before;
+    m_guide.fit_seconds += clock.wall();
+    m_guide.fit_cpu_seconds += clock.cpu();
+  }
+
+ private:
+  ImageEstimator& m_estimator;
+  Guide& m_guide;
+  std::optional<Automatic> m_automatic;
+};
 
 }  // namespace
 
@@ -109,25 +59,26 @@ std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& b
   int planned = replays ? 0 : budget.spp;
   for (const PassRecord& pass : budget.replay) planned += pass.spp;
   double per_spp = 0;  // seconds, of the pass before
-  Trial trial(budget.by_clock());
-  const bool online = guide.trainer != nullptr;
+  Passes drawn(estimator, guide, budget.by_clock());
+  Automatic* const automatic = drawn.automatic();
+  if (automatic && replays) automatic->start_replay(budget.replay);
+  const bool online = drawn.online();
   std::vector<PassRecord> passes;
   int done = 0;
   // Decides on the next pass; false if no more fits into the budget.
   const auto plan = [&](PassRecord& pass) {
     pass.spp = std::max(1, done);
-    bool last;
-    if (budget.deadline) {
-      const int fits = done > 0 ? static_cast<int>(std::min(left() / per_spp, 1e8)) : 0;
-      if (done > 0 && fits < 1) return false;
-      last = done > 0 && 2 * pass.spp > fits;
-      if (last) pass.spp = fits;
-    } else {
-      pass.spp = std::min(pass.spp, budget.spp - done);
-      if (pass.spp == 0) return false;
-      last = done + pass.spp == budget.spp;
-    }
-    pass.teaches = (guide.keep || !last) && (!guide.automatic || trial.teaches(done));
+    pass.teaches = true;
+    const int fits = !budget.deadline ? budget.spp - done
+                     : done > 0       ? static_cast<int>(std::min(left() / per_spp, 1e8))
+                                      : 1;
+    if (fits < 1) return false;
+    // What is left is not enough for another pass that doubles all: then it is one with this.
+    if (budget.deadline && done > 0 && 2 * pass.spp > fits) pass.spp = fits;
+    pass.spp = std::min(pass.spp, fits);
+    if (automatic) automatic->plan(pass, done);
+    const bool last = pass.spp == fits && !(budget.deadline && done == 0);
+    pass.teaches = pass.teaches && (guide.keep || !last);
     return true;
   };
   while (!g_interrupted) {
@@ -149,19 +100,22 @@ std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& b
       return ends;
     };
     const Stopwatch clock;
-    add_pass(estimator, pass.spp, !guide.automatic || !Trial::is_plain(done), pass.teaches,
-             online ? weight_of_pass(done) : 1, guide, report, stop);
+    const std::uint64_t before = estimator.cost().samples;
+    drawn.add(pass, online ? weight_of_pass(done) : 1, report, stop);
     per_spp = clock.wall() / pass.spp;
-    if (replays) {
-      if (pass.gave_up) guide.give_up("plain path tracing, as recorded");
-    } else {
-      if (guide.automatic && !g_interrupted) pass.gave_up = trial.judge(estimator, done, per_spp, guide);
-      pass.batches = begun;
+    if (!replays) pass.batches = begun;
+    if (automatic && replays) automatic->replay(pass);
+    if (automatic && !replays && !g_interrupted) {
+      const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
+      const double paths = static_cast<double>(estimator.cost().samples - before) / pass.spp;
+      const double spp_left = budget.deadline ? left() / per_spp : budget.spp - done - pass.spp;
+      automatic->judge(pass, {done, error, per_spp, paths, spp_left});
     }
     passes.push_back(pass);
     done += pass.spp;
     checkpoint();
   }
+  if (automatic) guide.choice = replays ? "as recorded" : automatic->choice();
   return passes;
 }
 

@@ -8,6 +8,7 @@
 #include "core/ordered.h"
 #include "core/pass_record.h"
 #include "estimate/image_estimator.h"
+#include "render/automatic.h"
 #include "train/vertex_trainer.h"
 
 namespace warpath {
@@ -26,18 +27,13 @@ struct Guide {
   std::optional<Objective> objective{};      ///< where samples go; else every pixel has as many
   std::shared_ptr<const VertexWarp> warp{};  ///< draws the numbers of vertices; null: they are uniform
   std::unique_ptr<VertexTrainer> trainer{};  ///< learns the warp from each pass for the next; null: it stays
-  bool automatic = false;                    ///< the warp is given up if it does not pay for what it costs
-  std::string choice{};                      ///< what was decided, and why
+  std::vector<Contender> contenders{};       ///< of `auto`, which chooses among them; then there is no warp or trainer
+  std::string choice{};                      ///< what it chose, and why
   bool keep = false;                         ///< learns from the last pass, too: the warp is wanted, not the image
   double fit_seconds = 0;                    ///< spent between passes
   double fit_cpu_seconds = 0;                ///< the same, of all threads
   std::uint64_t taught = 0;                  ///< paths that the warp has learned from
-  bool empty() const { return !objective && !warp && !trainer; }
-  void give_up(std::string why) {
-    warp = nullptr, trainer = nullptr;
-    automatic = false;
-    choice = std::move(why);
-  }
+  bool empty() const { return !objective && !warp && !trainer && contenders.empty(); }
 };
 
 /// Renders in passes that double what is there, so that an image that ends early is even, and calls `checkpoint` after

@@ -43,7 +43,8 @@ void for_each_field(Record& pass, F&& f) {
   f("spp", pass.spp);
   f("batches", pass.batches);
   f("teaches", pass.teaches);
-  f("gave_up", pass.gave_up);
+  f("drawn_by", pass.drawn_by);
+  f("chosen", pass.chosen);
 }
 
 template <class Run, class F>
