@@ -6,6 +6,7 @@ from tables import column, comparison_table, gain, mean, of_method, rows_of, wri
 from tool import compare, folder_of, own_scene, render_reference, shared_scene, train
 
 FIRST_HIT = "bounce1.lobe+bounce1"
+ALL_OF_FIRST_HIT = f"bounce1.light+bounce1.light_uv+{FIRST_HIT}"
 
 
 def field_at(label, methods, **options):
@@ -100,6 +101,21 @@ def views():
         write_table(folder_of(label), comparison_table(results))
 
 
+def conditional():
+    """Warps of the first hit over a stratified film, for both objectives: kd-trees in tiles of it, spline flows, the field; chi-squared against KL."""
+    for name in BOTH:
+        place, scene = f"conditional/{name}", shared_scene(name)
+        fixed = {"size": "320x180", "max_depth": 8, "spp": 128, "runs": 3, **reference(name)}
+        base = compare(f"{place}/base", scene, ["none"], **fixed)
+        table = comparison_table(base)
+        warps = [f"kdtree:{FIRST_HIT}", f"kdtree:{ALL_OF_FIRST_HIT}", f"spline:{FIRST_HIT}", f"spline:{ALL_OF_FIRST_HIT}", f"field:{ALL_OF_FIRST_HIT}"]
+        for objective in ("mse", "relmse"):
+            table += rows_of(compare(f"{place}/{objective}", scene, warps, **fixed, objective=objective), base, f"for {objective}")
+        likelihood = compare(f"{place}/likelihood", scene, [f"spline:{FIRST_HIT}"], **fixed, objective="mse", loss="likelihood")
+        table += rows_of(likelihood, base, "for mse, KL")
+        write_table(folder_of(place), table)
+
+
 def ablation():
     """What each part brings at 64 spp: conditioning, later vertices, light choice, loss, lobe, Sobol' points, allocation, what passes teach."""
     for name in BOTH:
@@ -112,7 +128,7 @@ def ablation():
             table.extend(rows_of(compare(f"{place}/{label}", scene, methods, **{**fixed, **options}), base, label))
 
         # The first hit's direction: one density for all pixels, one for each place, and one by a network.
-        add("first-hit", [f"spline:{FIRST_HIT}", f"field:{FIRST_HIT}", f"neural:{FIRST_HIT}"], objective="relmse", epp=4)
+        add("first-hit", [f"realnvp:{FIRST_HIT}", f"field:{FIRST_HIT}", f"neural:{FIRST_HIT}"], objective="relmse", epp=4)
         add("light-of-first-hit", ["field:bounce1.light+bounce1.light_uv"], objective="relmse")
         add("even-allocation", ["field"], objective="even")
         add("mse-allocation", ["field"], objective="mse")
@@ -126,4 +142,4 @@ def ablation():
         write_table(folder_of(place), table)
 
 
-ALL = (field_samples, field_time, ablation, field_own_scenes, auto_everywhere, door_ajar, views)
+ALL = (field_samples, field_time, conditional, ablation, field_own_scenes, auto_everywhere, door_ajar, views)

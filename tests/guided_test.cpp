@@ -10,6 +10,7 @@
 
 #include "estimate/image_estimator.h"
 #include "scene/scene.h"
+#include "train/conditional_kdtree_trainer.h"
 #include "train/conditional_spline_trainer.h"
 #include "train/field_trainer.h"
 #include "train/neural_trainer.h"
@@ -51,6 +52,13 @@ std::unique_ptr<VertexTrainer> make_trainer(const std::string& family, const Tra
     spline.flow.batch = 256;
     spline.min_visits = 4096;
     return std::make_unique<ConditionalSplineTrainer>(spline, 0.1, 1);
+  }
+  if (family == "kdtree:bounce1") {
+    ConditionalKdTreeSettings tree;
+    tree.numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
+    tree.tiles = 4;
+    const FilmSettings& film = tracer.scene().film;
+    return std::make_unique<ConditionalKdTreeTrainer>(tree, film.width, film.height, 0.1);
   }
   if (family == "neural:bounce1") settings.numbers = Layout::parse("bounce1.lobe+bounce1");
   if (family != "none") return std::make_unique<NeuralTrainer>(settings, tracer.emitters(), 1);
@@ -131,9 +139,9 @@ TEST(Guided, FieldsAndAllocationLeaveEveryPixelsMeanAsItIs) {
   }
 }
 
-TEST(Guided, NetworksLeaveEveryPixelsMeanAsItIs) {
+TEST(Guided, NetworksAndTreesLeaveEveryPixelsMeanAsItIs) {
   const Tracer& tracer = box_tracer(12, 8);
-  for (const char* family : {"neural", "neural:bounce1", "spline:bounce1"}) {
+  for (const char* family : {"neural", "neural:bounce1", "spline:bounce1", "kdtree:bounce1"}) {
     Spread spread;
     for (std::uint64_t seed = 0; seed < 200; ++seed)
       spread.add(guided(tracer, {16, 16, 32, 64}, Objective::relmse, family, seed));
@@ -152,7 +160,7 @@ TEST(Guided, CountsThatFollowFirefliesDoNotBiasThem) {
 }
 
 TEST(Guided, SameSeedSameBitsForAnyNumberOfThreads) {
-  for (const char* family : {"field", "neural", "spline:bounce1"}) {
+  for (const char* family : {"field", "neural", "spline:bounce1", "kdtree:bounce1"}) {
     const auto bits = [&](int threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
       return guided(box_tracer(48, 32), {2, 2, 4, 8}, Objective::relmse, family, 7).mean;

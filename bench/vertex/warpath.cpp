@@ -9,6 +9,8 @@
 #include "core/floating_point.h"
 #include "core/rng.h"
 #include "core/vertex_context_buffer.h"
+#include "train/conditional_kdtree_trainer.h"
+#include "train/conditional_spline_trainer.h"
 #include "train/neural_trainer.h"
 
 namespace {
@@ -78,6 +80,23 @@ std::shared_ptr<const VertexWarp> neural() {
   return teach(trainer);
 }
 
+const Layout& first_hit() {
+  static const Layout numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
+  return numbers;
+}
+std::shared_ptr<const VertexWarp> conditional_kdtree() {
+  ConditionalKdTreeSettings settings;
+  settings.numbers = first_hit();
+  ConditionalKdTreeTrainer trainer(settings, 320, 180, 0.1);
+  return teach(trainer);
+}
+std::shared_ptr<const VertexWarp> conditional_spline() {
+  ConditionalSplineSettings settings;
+  settings.numbers = first_hit();
+  ConditionalSplineTrainer trainer(settings, 0.1, 1);
+  return teach(trainer);
+}
+
 /// CPU seconds of this thread: others may be using the machine.
 double thread_seconds() {
   timespec time;
@@ -131,8 +150,18 @@ void draw_neural(benchmark::State& state) {
   static const auto warp = neural();
   draw(state, warp);
 }
+void draw_conditional_kdtree(benchmark::State& state) {
+  static const auto warp = conditional_kdtree();
+  draw(state, warp);
+}
+void draw_conditional_spline(benchmark::State& state) {
+  static const auto warp = conditional_spline();
+  draw(state, warp);
+}
 BENCHMARK(draw_field)->Name("draw/field");
 BENCHMARK(draw_neural)->Name("draw/neural");
+BENCHMARK(draw_conditional_kdtree)->Name("draw/kdtree of the first hit");
+BENCHMARK(draw_conditional_spline)->Name("draw/spline of the first hit");
 
 }  // namespace
 

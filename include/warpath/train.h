@@ -89,6 +89,21 @@ struct KdTreeSettings {
   double shrink = 16;    ///< a cell's mean is drawn to its parent's, the more the noisier the target; 0 believes it
 };
 
+/// Settings of the conditional kd-tree: a tree over the numbers of a vertex for each tile of the film. It learns while
+/// it renders.
+struct ConditionalKdTreeSettings {
+  ConditionalKdTreeSettings() {
+    tree.target = KdTreeSettings::Target::second_moment;
+    tree.max_leaves = 256;
+    tree.shrink = 10;
+  }
+  KdTreeSettings tree;          ///< of each tile
+  Layout numbers;               ///< that are warped, of one vertex: bounce1.lobe+bounce1.dir, ...
+  int tiles = 24;               ///< across the longer side of the film; they are about square
+  int tilings = 3;              ///< cuts of the film into tiles, each shifted by a part of one
+  int most_examples = 1 << 21;  ///< kept of all passes; 36 bytes each
+};
+
 /// Settings of the field, the warp that lives at every vertex and learns while it renders.
 struct FieldSettings {
   std::uint32_t max_cells = 1 << 15;
@@ -133,6 +148,7 @@ struct TrainSettings {
   RealNvpSettings realnvp;
   SplineSettings spline;
   ConditionalSplineSettings conditional_spline;
+  ConditionalKdTreeSettings conditional_kdtree;
   NeuralSettings neural;
   KdTreeSettings kdtree;
   GridSettings grid;

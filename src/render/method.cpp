@@ -6,6 +6,7 @@
 #include "core/rng.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
+#include "train/conditional_kdtree_trainer.h"
 #include "train/conditional_spline_trainer.h"
 #include "train/field_trainer.h"
 #include "train/neural_trainer.h"
@@ -143,6 +144,12 @@ std::unique_ptr<VertexTrainer> MethodTrainer::conditional_trainer(const Method& 
     settings.numbers = method.layout;
     return std::make_unique<ConditionalSplineTrainer>(settings, m_settings.uniform, m_settings.seed);
   }
+  if (method.family == "kdtree") {
+    ConditionalKdTreeSettings settings = m_settings.conditional_kdtree;
+    settings.numbers = method.layout;
+    const FilmSettings& film = m_tracer->scene().film;
+    return std::make_unique<ConditionalKdTreeTrainer>(settings, film.width, film.height, m_settings.uniform);
+  }
   return nullptr;
 }
 
@@ -153,6 +160,7 @@ std::vector<Contender> MethodTrainer::contenders(std::unique_ptr<VertexTrainer> 
   const auto add = [&](const char* name, double path_cost, double fit_cost) {
     all.push_back({name, conditional_trainer(parse_method(name)), path_cost, fit_cost});
   };
+  add("kdtree:bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1", 1.25, 4e4);
   add("spline:bounce1.lobe+bounce1", 1.5, 6e4);
   return all;
 }

@@ -42,7 +42,7 @@ ConditionalSpline::ConditionalSpline(std::shared_ptr<const Shape> shape, const V
     : m_shape(std::move(shape)),
       m_box(box),
       m_parameters(std::move(parameters)),
-      m_uniform(uniform),
+      m_uniform(static_cast<double>(static_cast<float>(uniform))),
       m_numbers(std::move(numbers)) {
   WARPATH_CHECK(uniform >= 0 && uniform < 1);
   for (std::size_t w = 0; w < m_packed.size(); ++w) {

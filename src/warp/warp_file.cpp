@@ -1,6 +1,7 @@
 #include "warpath/warp_file.h"
 
 #include "core/tensor_file.h"
+#include "warp/conditional_kdtree.h"
 #include "warp/conditional_spline.h"
 #include "warp/field.h"
 #include "warp/load.h"
@@ -50,6 +51,10 @@ WarpFile load_warp(const std::filesystem::path& path) {
     const auto field = Field::load(tensors, kPrefix);
     file.vertex_warp = field;
     file.layout = field->numbers();
+  } else if (family == "conditional-kdtree") {
+    const auto tree = ConditionalKdTree::load(tensors, kPrefix);
+    file.vertex_warp = tree;
+    file.layout = tree->numbers();
   } else if (family == "conditional-spline") {
     const auto spline = ConditionalSpline::load(tensors, kPrefix);
     file.vertex_warp = spline;

@@ -1,0 +1,130 @@
+#include "train/conditional_kdtree_trainer.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/tensor_file.h"
+#include "train/vertex_trainer_fixture.h"
+#include "warpath/error.h"
+
+namespace warpath {
+namespace {
+
+using test::Batch, test::gain, test::taught, test::teach;
+
+constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
+constexpr double kUniform = 0.1;
+
+ConditionalKdTreeSettings small() {
+  ConditionalKdTreeSettings settings;
+  settings.numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
+  settings.tiles = 8;
+  return settings;
+}
+
+ConditionalKdTreeTrainer trainer_of(const ConditionalKdTreeSettings& settings, double uniform = kUniform) {
+  return ConditionalKdTreeTrainer(settings, 64, 48, uniform);
+}
+
+// Light comes from a quarter of the numbers, which moves with the place on the film: a density that does not know the
+// place can gain no more than ln 4 / 3, one that does ln 3.7 with a tenth of uniform numbers.
+TEST(ConditionalKdTreeTrainer, LearnsWhatMovesWithThePlaceOnTheFilm) {
+  auto trainer = trainer_of(small());
+  const auto tree = taught(trainer, 4);
+  for (const auto which : kBoth) EXPECT_GT(gain(*tree, which), 0.8);
+}
+
+TEST(ConditionalKdTreeTrainer, SameBitsForAnyNumberOfThreads) {
+  std::vector<std::vector<float>> splits;
+  for (const std::size_t threads : {1, 2, 5}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    auto trainer = trainer_of(small());
+    TensorFile file;
+    taught(trainer, 3, 4)->save(file, "");
+    splits.push_back(file.get<float>("scatter.z_split").values);
+  }
+  EXPECT_GT(splits[0].size(), 100u);
+  EXPECT_EQ(splits[0], splits[1]);
+  EXPECT_EQ(splits[0], splits[2]);
+}
+
+TEST(ConditionalKdTreeTrainer, LearnsTheNumbersThatItIsToWarp) {
+  ConditionalKdTreeSettings settings = small();
+  settings.numbers = Layout::parse("bounce2.lobe+bounce2");
+  auto trainer = trainer_of(settings);
+  for (int b = 0; b < 8; ++b) teach(trainer, Batch(static_cast<std::uint64_t>(b)), 1);
+  EXPECT_NEAR(gain(*trainer.fit(), VertexNumbers::scatter), 0, 1e-6) << "nothing was seen of bounce 2";
+  for (int b = 0; b < 8; ++b) teach(trainer, Batch(static_cast<std::uint64_t>(b)), 2);
+  const auto tree = trainer.fit();
+  EXPECT_GT(gain(*tree, VertexNumbers::scatter), 0.5);
+  EXPECT_NEAR(gain(*tree, VertexNumbers::light), 0, 1e-6);
+  EXPECT_TRUE(tree->warps(VertexNumbers::scatter, 2));
+  EXPECT_FALSE(tree->warps(VertexNumbers::scatter, 1));
+}
+
+// What is learned from those examples that there is room for is what all of them would teach, if less of it.
+TEST(ConditionalKdTreeTrainer, LearnsFromTheExamplesThatFit) {
+  ConditionalKdTreeSettings settings = small();
+  settings.most_examples = 20'000;
+  auto trainer = trainer_of(settings);
+  const auto tree = taught(trainer, 4);
+  for (const auto which : kBoth) EXPECT_GT(gain(*tree, which), 0.5);
+}
+
+// Numbers drawn by a density that has learned teach the same as uniform ones: what they bring comes with 1 / q.
+TEST(ConditionalKdTreeTrainer, NumbersOfAnyDensityTeach) {
+  auto uniform = trainer_of(small()), skewed = trainer_of(small());
+  for (int b = 0; b < 24; ++b) {
+    Batch batch(static_cast<std::uint64_t>(b));
+    teach(uniform, batch);
+    // The second number is y^2 with y uniform: q = 1 / (2 sqrt(u)).
+    std::vector<float> inv_q;
+    for (std::size_t i = 0; i < test::kBatch; ++i) {
+      const float y = batch.numbers[4][i], x = batch.buffer.view().position[0][i];
+      batch.numbers[4][i] = y * y;
+      inv_q.push_back(2 * y);
+      batch.beyond[i] = Batch::lit(x, y * y) ? 100 * 2 * y : 0.0f;
+    }
+    VertexRecords records = batch.records();
+    records.inv_q_scatter = inv_q.data();
+    const auto recorder = skewed.make_recorder();
+    recorder->record(records);
+    skewed.merge(*recorder);
+  }
+  const double of_uniform = gain(*uniform.fit(), VertexNumbers::scatter);
+  EXPECT_NEAR(gain(*skewed.fit(), VertexNumbers::scatter), of_uniform, 0.1 * of_uniform);
+}
+
+TEST(ConditionalKdTreeTrainer, ValuesThatAreNotFiniteTeachNothing) {
+  auto trainer = trainer_of(small());
+  for (std::uint64_t b = 0; b < 8; ++b) {
+    Batch batch(b);
+    std::fill(batch.beyond.begin(), batch.beyond.end(), std::nanf(""));
+    std::fill(batch.light.begin(), batch.light.end(), INFINITY);
+    teach(trainer, batch);
+  }
+  const auto tree = trainer.fit();
+  for (const auto which : kBoth) EXPECT_NEAR(gain(*tree, which), 0, 1e-6);
+}
+
+TEST(ConditionalKdTreeTrainer, SettingsThatMakeNoSense) {
+  const auto refused = [](auto change, double uniform = kUniform) {
+    ConditionalKdTreeSettings settings = small();
+    change(settings);
+    EXPECT_THROW(trainer_of(settings, uniform), ConfigError);
+  };
+  refused([](auto& settings) { settings.tiles = 0; });
+  refused([](auto& settings) { settings.tilings = 0; });
+  refused([](auto& settings) { settings.tilings = 9; });
+  refused([](auto& settings) { settings.most_examples = 0; });
+  refused([](auto& settings) { settings.numbers = Layout::parse("bounce1"); });
+  refused([](auto& settings) { settings.numbers = Layout::parse("bounce1.lobe+bounce1+bounce2.lobe+bounce2"); });
+  refused([](auto& settings) { settings.numbers = {}; });
+  refused([](auto&) {}, 1.0);
+}
+
+}  // namespace
+}  // namespace warpath
