@@ -41,7 +41,8 @@ void add_options(CLI::App& app, TrainingOptions& options) {
       "Whether candidates count in the image: discard (as the paper does) or use")
       ->check(CLI::IsMember({"discard", "use"}));
 
-  constexpr auto kFlow = "Real NVP and spline (neural: width, blocks, rate and batch, with its own defaults)";
+  constexpr auto kFlow =
+      "Real NVP and spline (without film, and neural: width, blocks, rate and batch, with defaults of their own)";
   const auto add_flow = [&](const char* name, auto& value, const char* help) {
     return app.add_option(name, value, help)->group(kFlow);
   };
