@@ -64,6 +64,9 @@ class CommandLine(unittest.TestCase):
         self.fails(2, "render", BOX, "--warp", "field:film", "-o", self.path("a.exr"), says=["field:film", "light_uv"])
         self.fails(2, "render", BOX, "--warp", "neural:film+bounce1", "-o", self.path("a.exr"), says=["neural:film+bounce1", "light_uv"])
         self.fails(2, "render", BOX, "--warp", "neural:bounce1", "-o", self.path("a.exr"), says=["bounce1.lobe+bounce1.dir"])
+        for method in ("kdtree:bounce1.lobe+bounce1", "spline:bounce1.lobe+bounce1"):
+            self.fails(2, "render", BOX, "--warp", method, "--init", BOX, "-o", self.path("a.exr"), says=[method, "starts anew"])
+        self.fails(2, "render", BOX, "--warp", "kdtree:bounce1.lobe+bounce1+bounce2.lobe+bounce2", "-o", self.path("a.exr"), says=["one vertex"])
         self.fails(2, "render", BOX, "--warp", "field", "--objective", "mape", "-o", self.path("a.exr"), says=["--objective"])
 
     def test_bad_files_exit_with_3(self):
@@ -80,7 +83,7 @@ class CommandLine(unittest.TestCase):
             self.fails(3, "render", BOX, "--warp", warp, "-o", self.path("a.exr"), says=["broken.warp"])
 
     def test_same_seed_same_file_for_any_number_of_threads(self):
-        for warp in ("none", "kdtree:film+bounce1", "field", "neural", "auto"):
+        for warp in ("none", "kdtree:film+bounce1", "field", "neural", "kdtree:bounce1.lobe+bounce1", "spline:bounce1.lobe+bounce1", "auto"):
             images = []
             for threads in (1, 2):
                 out = self.path(f"{threads}.exr")
@@ -130,7 +133,9 @@ class CommandLine(unittest.TestCase):
     def test_warps_of_vertices_are_saved_with_the_numbers_that_they_warp(self):
         warp, out = self.path("box.warp"), self.path("out.exr")
         for method, what in (("neural", "every vertex"), ("neural:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir"),
-                             ("field:bounce1.light+bounce1.light_uv", "bounce1.light+bounce1.light_uv")):
+                             ("field:bounce1.light+bounce1.light_uv", "bounce1.light+bounce1.light_uv"),
+                             ("kdtree:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir"),
+                             ("spline:bounce1.lobe+bounce1+bounce2.lobe+bounce2", "bounce2.lobe+bounce2.dir")):
             result = self.warpath("train", BOX, "--warp", method, "-o", warp, "--examples", 2048, "--batch", 256, *SMALL)
             self.assertEqual(result.returncode, 0, result.stderr)
             told = self.warpath("inspect", warp).stdout
