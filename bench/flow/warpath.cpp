@@ -16,7 +16,7 @@
 namespace {
 using namespace warpath;
 
-constexpr std::size_t kSamples = 2048;
+constexpr std::size_t kSamples = 2560;  // of a batch of the estimator
 
 Matrix<double> uniform_rows(std::size_t cols) {
   Matrix<double> z(kSamples, cols);
@@ -45,7 +45,9 @@ void forward(benchmark::State& state, const std::shared_ptr<const Warp>& warp) {
 void draw(benchmark::State& state, const std::shared_ptr<const Warp>& warp) {
   const auto uniform = std::make_shared<Uniform>(warp->dims());
   const Mixture mixture({{uniform, 0.1}, {warp, 0.9}});
-  const Matrix<double> z = uniform_rows(static_cast<std::size_t>(warp->dims())), u = uniform_rows(1);
+  const Matrix<double> z = uniform_rows(static_cast<std::size_t>(warp->dims()));
+  Matrix<double> u = uniform_rows(1);  // stratified, as the estimator has them where the film is warped
+  for (std::size_t i = 0; i < kSamples; ++i) u(i, 0) = (static_cast<double>(i) + u(i, 0)) / kSamples;
   Matrix<double> y(kSamples, z.cols());
   std::vector<double> log_q(kSamples);
   for (auto _ : state) {

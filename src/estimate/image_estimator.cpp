@@ -17,8 +17,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Lanes of one wavefront: enough to fill SIMD kernels and to sort rays, few enough to stay in L2.
-constexpr std::size_t kBatch = 2048;
+/// Lanes of one wavefront: enough to fill SIMD kernels and to sort rays, few enough to stay in L2. A tenth of uniform
+/// samples, and the rest, fill whole blocks of 64 in the kernels of a warp.
+constexpr std::size_t kBatch = 2560;
 /// Side of the square of pixels that is rendered together, so that camera rays of a batch are coherent.
 constexpr int kTile = 8;
 /// Camera rays for directly seen emission, per path of a pixel that may see it: its edges would else be all that one

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "warp/load.h"
+#include "warp/log_add.h"
 #include "warp/scratch.h"
 #include "warpath/error.h"
 
@@ -13,12 +14,6 @@ namespace warpath {
 namespace {
 
 constexpr std::size_t kMaxComponents = 64;
-
-/// ln(e^a + e^b) without overflow; -infinity stands for 0.
-double log_add(double a, double b) {
-  const double high = std::max(a, b), low = std::min(a, b);
-  return low == -std::numeric_limits<double>::infinity() ? high : high + std::log1p(std::exp(low - high));
-}
 
 }  // namespace
 
@@ -73,19 +68,16 @@ void Mixture::sample(Batch<const double> z, std::span<const double> u, Batch<dou
     for (std::size_t j = first[k]; j < first[k + 1]; ++j) packed_q[j] += std::log(m_components[k].weight);
   }
   if (m_components.size() > 1) {
-    const auto rows_of_others = [&](std::size_t k, auto&& each) {
-      for (std::size_t j = 0; j < first[k]; ++j) each(j, j);
-      for (std::size_t j = first[k + 1]; j < rows; ++j) each(j, j - (first[k + 1] - first[k]));
-    };
     for (std::size_t k = 0; k < m_components.size(); ++k) {
       const std::size_t count = rows - (first[k + 1] - first[k]);
       if (count == 0) continue;
-      rows_of_others(
-          k, [&](std::size_t j, std::size_t o) { std::copy_n(&packed_y[j * cols], cols, &others_y[o * cols]); });
+      // Those before the component's own, and those behind.
+      std::copy_n(packed_y.data(), first[k] * cols, others_y.data());
+      std::copy_n(packed_y.data() + first[k + 1] * cols, (rows - first[k + 1]) * cols, &others_y[first[k] * cols]);
       m_components[k].proposal->log_density({others_y.data(), count, cols}, {others_q.data(), count});
       const double log_weight = std::log(m_components[k].weight);
-      rows_of_others(
-          k, [&](std::size_t j, std::size_t o) { packed_q[j] = log_add(packed_q[j], log_weight + others_q[o]); });
+      log_add(first[k], packed_q.data(), others_q.data(), log_weight);
+      log_add(count - first[k], &packed_q[first[k + 1]], &others_q[first[k]], log_weight);
     }
   }
   for (std::size_t j = 0; j < rows; ++j) {
@@ -99,8 +91,7 @@ void Mixture::log_density(Batch<const double> y, std::span<double> log_q) const 
   std::fill_n(log_q.begin(), y.rows(), -std::numeric_limits<double>::infinity());
   for (const Component& component : m_components) {
     component.proposal->log_density(y, {of_component.data(), y.rows()});
-    const double log_weight = std::log(component.weight);
-    for (std::size_t i = 0; i < y.rows(); ++i) log_q[i] = log_add(log_q[i], log_weight + of_component[i]);
+    log_add(y.rows(), log_q.data(), of_component.data(), std::log(component.weight));
   }
 }
 
