@@ -75,7 +75,7 @@ def auto_everywhere():
             none, auto = of_method(runs, "none"), of_method(runs, "auto")
             ratio, error = gain(auto, none, objective)
             means = (f"{mean(column(some, objective)):.4g}" for some in (none, auto))
-            chosen = sorted({run["training_stopped"].split(":")[0] for run in auto})
+            chosen = sorted({run["training_stopped"].split(";")[0] for run in auto})
             lines.append(f"| {name} | {objective} | {' | '.join(means)} | {ratio:.3f} ± {error:.3f} | {ratio + T_OF_TEN_RUNS * error:.3f} | {', '.join(chosen)} |")
     write_table(folder_of("auto-everywhere"), lines)
 
