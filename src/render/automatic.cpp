@@ -37,18 +37,20 @@ constexpr double kLearned = 0.5;
 constexpr int kWatchedSpp = 64;
 constexpr double kTeachingShare = 0.08;
 
+/// The one of that name; null if there is none.
+template <class Contenders>
+auto* find(Contenders& contenders, const std::string& name) {
+  const auto at = std::find_if(contenders.begin(), contenders.end(), [&](auto& c) { return c.name == name; });
+  return at == contenders.end() ? nullptr : &*at;
+}
+
 }  // namespace
 
 Automatic::Automatic(std::vector<Contender> contenders, bool by_clock)
     : m_contenders(std::move(contenders)), m_by_clock(by_clock) {}
 
-Contender* Automatic::find(const std::string& name) {
-  const auto at = std::find_if(m_contenders.begin(), m_contenders.end(), [&](auto& c) { return c.name == name; });
-  return at == m_contenders.end() ? nullptr : &*at;
-}
-
 const Contender* Automatic::next_to_try() const {
-  const auto at = std::find_if(m_contenders.begin(), m_contenders.end(), [](auto& c) { return c.error == 0; });
+  const auto at = std::find_if(m_contenders.begin(), m_contenders.end(), [](auto& c) { return !c.tried; });
   return at == m_contenders.end() ? nullptr : &*at;
 }
 
@@ -67,13 +69,13 @@ void Automatic::plan(PassRecord& pass, int done) const {
 }
 
 const VertexWarp* Automatic::warp(const PassRecord& pass) const {
-  const Contender* contender = find(pass.drawn_by);
+  const Contender* contender = find(m_contenders, pass.drawn_by);
   return contender ? contender->warp.get() : nullptr;
 }
 
 VertexLearner* Automatic::learner(const PassRecord& pass) {
   if (!pass.teaches) return nullptr;
-  if (Contender* contender = find(pass.drawn_by)) return contender->trainer.get();
+  if (Contender* contender = find(m_contenders, pass.drawn_by)) return contender->trainer.get();
   std::vector<VertexTrainer*> all;
   for (const Contender& contender : m_contenders) all.push_back(contender.trainer.get());
   if (all.size() < 2) return all.empty() ? nullptr : all.front();
@@ -110,7 +112,7 @@ void Automatic::choose(PassRecord& pass, const Contender* chosen) {
   pass.chosen = chosen ? chosen->name : kPlain;
   m_choice = fmt::format("{}; efficiency, 1 / (error x cost), over that of uniform numbers:", pass.chosen);
   for (const Contender& contender : m_contenders)
-    if (contender.error > 0) m_choice += fmt::format(" {} {:.2f}", contender.name, gain(contender));
+    if (contender.tried) m_choice += fmt::format(" {} {:.2f}", contender.name, gain(contender));
   log::info("auto: {}", m_choice);
   replay(pass);
 }
@@ -123,7 +125,8 @@ void Automatic::judge(PassRecord& pass, const Measured& measured) {
     if (measured.done == kPlainCostSpp || m_plain_seconds == 0) m_plain_seconds = measured.seconds_per_spp;
     return;
   }
-  Contender& contender = *find(pass.drawn_by);
+  Contender& contender = *find(m_contenders, pass.drawn_by);
+  contender.tried = true;
   contender.error = measured.error;
   contender.seconds = measured.seconds_per_spp;
   if (!m_chosen) {

@@ -18,7 +18,8 @@ struct Contender {
   std::shared_ptr<const VertexWarp> warp{};  ///< what it has learned so far; null: nothing
 
   // What was measured of it.
-  double error = 0;        ///< of one sample that it draws; 0: not yet
+  bool tried = false;
+  double error = 0;        ///< of one sample that it draws
   double seconds = 0;      ///< for a sample per pixel
   double fit_seconds = 0;  ///< of the last one
 };
@@ -60,8 +61,6 @@ class Automatic {
   const std::string& choice() const { return m_choice; }
 
  private:
-  Contender* find(const std::string& name);
-  const Contender* find(const std::string& name) const { return const_cast<Automatic*>(this)->find(name); }
   const Contender* next_to_try() const;
   double gain(const Contender& contender) const;
   void drop_costly(const Measured& measured);

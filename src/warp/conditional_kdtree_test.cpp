@@ -62,29 +62,7 @@ TEST(ConditionalKdTree, SamplesAndDensitiesAgree) {
   }
 }
 
-// E[1 / q] = 1, and the mean of a function of the numbers is that under uniform numbers: 4.5 standard errors each, a
-// false alarm in 18,000 choices of numbers.
-TEST(ConditionalKdTree, WeightedDrawsAreUniform) {
-  const VertexContextBuffer vertices = test::random_vertices();
-  const ConditionalKdTree tree = example();
-  for (const auto which : kBoth) {
-    const Drawn drawn = draw(tree, which, vertices.view());
-    const auto expect_mean = [&](double expected, const auto& value) {
-      double sum = 0, square = 0;
-      for (std::size_t i = 0; i < kVertices; ++i) {
-        const double v = static_cast<double>(drawn.inv_q[i]) * value(i);
-        sum += v / kVertices;
-        square += v * v / kVertices;
-      }
-      EXPECT_NEAR(sum, expected, 4.5 * std::sqrt((square - sum * sum) / kVertices));
-    };
-    expect_mean(1, [](std::size_t) { return 1.0; });
-    for (std::size_t a = 0; a < 3; ++a)
-      expect_mean(0.5, [&](std::size_t i) { return static_cast<double>(drawn.y[a][i]); });
-    expect_mean(0.125,
-                [&](std::size_t i) { return static_cast<double>(drawn.y[0][i] * drawn.y[1][i] * drawn.y[2][i]); });
-  }
-}
+TEST(ConditionalKdTree, WeightedDrawsAreUniform) { test::expect_weighted_draws_are_uniform(example()); }
 
 // Latents that lie evenly: each cell of a grid of y gets as many draws as its density says.
 TEST(ConditionalKdTree, DrawsFollowTheDensity) {
@@ -126,17 +104,7 @@ TEST(ConditionalKdTree, DrawsFollowTheDensity) {
   EXPECT_GT(*std::max_element(expected.begin(), expected.end()), 0.16) << "not uniform";
 }
 
-// What is drawn at a vertex must not depend on which others are in its batch.
-TEST(ConditionalKdTree, VerticesDoNotKnowOfEachOther) {
-  const ConditionalKdTree tree = example();
-  const VertexContextBuffer vertices = test::random_vertices();
-  const Drawn all = draw(tree, VertexNumbers::light, vertices.view());
-  const Drawn rest = draw(tree, VertexNumbers::light, vertices.view(), 77);
-  for (std::size_t i = 77; i < kVertices; ++i) {
-    ASSERT_EQ(all.inv_q[i], rest.inv_q[i - 77]);
-    for (std::size_t a = 0; a < 3; ++a) ASSERT_EQ(all.y[a][i], rest.y[a][i - 77]);
-  }
-}
+TEST(ConditionalKdTree, VerticesDoNotKnowOfEachOther) { test::expect_vertices_do_not_know_of_each_other(example()); }
 
 TEST(ConditionalKdTree, IsTheSameAfterSavingAndLoading) {
   const ConditionalKdTree tree = example(0.1, Layout::parse("bounce2.lobe+bounce2+bounce2.light+bounce2.light_uv"));

@@ -52,42 +52,9 @@ TEST(ConditionalSpline, SamplesAndDensitiesAgree) {
   }
 }
 
-// E[1 / q] = 1, and the mean of a function of the numbers is that under uniform numbers: 4.5 standard errors each, a
-// false alarm in 18,000 choices of numbers. The share of uniform numbers bounds 1 / q.
-TEST(ConditionalSpline, WeightedDrawsAreUniform) {
-  const VertexContextBuffer vertices = test::random_vertices();
-  const ConditionalSpline spline = example();
-  for (const auto which : kBoth) {
-    const Drawn drawn = draw(spline, which, vertices.view());
-    const auto expect_mean = [&](double expected, const auto& value) {
-      double sum = 0, square = 0;
-      for (std::size_t i = 0; i < kVertices; ++i) {
-        const double v = static_cast<double>(drawn.inv_q[i]) * value(i);
-        sum += v / kVertices;
-        square += v * v / kVertices;
-      }
-      EXPECT_NEAR(sum, expected, 4.5 * std::sqrt((square - sum * sum) / kVertices));
-    };
-    expect_mean(1, [](std::size_t) { return 1.0; });
-    for (std::size_t a = 0; a < 3; ++a)
-      expect_mean(0.5, [&](std::size_t i) { return static_cast<double>(drawn.y[a][i]); });
-    expect_mean(0.125,
-                [&](std::size_t i) { return static_cast<double>(drawn.y[0][i] * drawn.y[1][i] * drawn.y[2][i]); });
-  }
-}
+TEST(ConditionalSpline, WeightedDrawsAreUniform) { test::expect_weighted_draws_are_uniform(example()); }
 
-// What is drawn at a vertex must not depend on which others are in its batch.
-TEST(ConditionalSpline, VerticesDoNotKnowOfEachOther) {
-  const ConditionalSpline spline = example();
-  const VertexContextBuffer vertices = test::random_vertices();
-  for (const auto which : kBoth) {
-    const Drawn all = draw(spline, which, vertices.view()), rest = draw(spline, which, vertices.view(), 77);
-    for (std::size_t i = 77; i < kVertices; ++i) {
-      ASSERT_EQ(all.inv_q[i], rest.inv_q[i - 77]);
-      for (std::size_t a = 0; a < 3; ++a) ASSERT_EQ(all.y[a][i], rest.y[a][i - 77]);
-    }
-  }
-}
+TEST(ConditionalSpline, VerticesDoNotKnowOfEachOther) { test::expect_vertices_do_not_know_of_each_other(example()); }
 
 TEST(ConditionalSpline, SeesTheFilm) {
   const ConditionalSpline spline = example();

@@ -41,18 +41,7 @@ TEST(Neural, SamplesAndDensitiesAgree) {
   }
 }
 
-// What is drawn at a vertex must not depend on which others are in its batch.
-TEST(Neural, VerticesDoNotKnowOfEachOther) {
-  const Neural neural = example(3);
-  const VertexContextBuffer vertices = test::random_vertices();
-  for (const auto which : {VertexNumbers::light, VertexNumbers::scatter}) {
-    const Drawn all = draw(neural, which, vertices.view()), rest = draw(neural, which, vertices.view(), 77);
-    for (std::size_t i = 77; i < kVertices; ++i) {
-      ASSERT_EQ(all.inv_q[i], rest.inv_q[i - 77]);
-      for (std::size_t a = 0; a < 3; ++a) ASSERT_EQ(all.y[a][i], rest.y[a][i - 77]);
-    }
-  }
-}
+TEST(Neural, VerticesDoNotKnowOfEachOther) { test::expect_vertices_do_not_know_of_each_other(example(3)); }
 
 TEST(Neural, IsTheSameAfterSavingAndLoading) {
   const Layout numbers = Layout::parse("bounce1.lobe+bounce1+bounce2.light+bounce2.light_uv");
