@@ -21,7 +21,7 @@ constexpr int kPlainCostSpp = 2;
 /// Samples per pixel by which contenders other than the first are judged.
 constexpr int kOthersSpp = 4;
 /// They are tried if as many as this are to be rendered, and if learning costs them less than such a share of it.
-constexpr double kOthersMinSpp = 200, kOthersMostFitting = 0.04;
+constexpr double kOthersMinSpp = 200, kOthersMostFitting = 0.02;
 /// And must be so much better than the first, which has more to learn.
 constexpr double kOthersBetter = 1.5;
 /// After its first pass, where it knows little yet, a warp is given up only if its error times cost is so much worse;

@@ -101,6 +101,7 @@ std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& b
     };
     const Stopwatch clock;
     const std::uint64_t before = estimator.cost().samples;
+    const double fitted_before = guide.fit_seconds;
     drawn.add(pass, online ? weight_of_pass(done) : 1, report, stop);
     per_spp = clock.wall() / pass.spp;
     if (!replays) pass.batches = begun;
@@ -108,8 +109,10 @@ std::vector<PassRecord> render_passes(ImageEstimator& estimator, const Budget& b
     if (automatic && !replays && !g_interrupted) {
       const double error = estimator.pass_moments().error(guide.objective, estimator.moments());
       const double paths = static_cast<double>(estimator.cost().samples - before) / pass.spp;
-      const double spp_left = budget.deadline ? left() / per_spp : budget.spp - done - pass.spp;
-      automatic->judge(pass, {done, error, per_spp, paths, spp_left});
+      // What is learned between passes is not a part of what a path costs.
+      const double drawing = per_spp - (guide.fit_seconds - fitted_before) / pass.spp;
+      const double spp_left = budget.deadline ? left() / drawing : budget.spp - done - pass.spp;
+      automatic->judge(pass, {done, error, drawing, paths, spp_left});
     }
     passes.push_back(pass);
     done += pass.spp;
