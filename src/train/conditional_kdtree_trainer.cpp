@@ -122,6 +122,8 @@ ConditionalKdTree::Trees ConditionalKdTreeTrainer::grow(const Examples& examples
         rows.inv_q[i] = e.inv_q;
         most = std::max(most, e.weight);
       }
+      // In units of the largest: their squares must not leave the range of a float.
+      for (float& weight : rows.weight) weight /= most;
       if (most > 0) trees[first + t] = fit_kdtree(std::move(rows), m_settings.tree)->nodes();
     });
   }

@@ -65,6 +65,23 @@ TEST(ConditionalKdTreeTrainer, LearnsTheNumbersThatItIsToWarp) {
   EXPECT_FALSE(tree->warps(VertexNumbers::scatter, 1));
 }
 
+// Only ratios of what comes back matter, however bright the lights are.
+TEST(ConditionalKdTreeTrainer, TheUnitOfLightDoesNotMatter) {
+  std::vector<double> gains;
+  for (const float unit : {1.0f, 0x1p80f, 0x1p-80f}) {
+    auto trainer = trainer_of(small());
+    for (std::uint64_t b = 0; b < 8; ++b) {
+      Batch batch(b);
+      for (float& beyond : batch.beyond) beyond *= unit;
+      teach(trainer, batch);
+    }
+    gains.push_back(gain(*trainer.fit(), VertexNumbers::scatter));
+  }
+  EXPECT_GT(gains[0], 0.5);
+  EXPECT_EQ(gains[0], gains[1]);
+  EXPECT_EQ(gains[0], gains[2]);
+}
+
 // What is learned from those examples that there is room for is what all of them would teach, if less of it.
 TEST(ConditionalKdTreeTrainer, LearnsFromTheExamplesThatFit) {
   ConditionalKdTreeSettings settings = small();

@@ -59,6 +59,18 @@ class ConditionalSplineTrainer::Brightness {
   double m_mean = 0;
 };
 
+/// Keeps an example that weighs less than `level` with a probability of what it has of that. Chance belongs to its
+/// numbers, whatever thread they came from, and to the level.
+bool ConditionalSplineTrainer::survives(Example& example, double level) {
+  if (!(example.weight < level)) return true;
+  const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x)}; };
+  const std::uint64_t key = sample_key(bits(example.y[0]) << 32 | bits(example.y[1]), bits(example.y[2]));
+  const auto salt = std::bit_cast<std::uint32_t>(static_cast<float>(level));
+  if (sample_double(key, salt) * level >= static_cast<double>(example.weight)) return false;
+  example.weight = static_cast<float>(level);
+  return true;
+}
+
 class ConditionalSplineTrainer::Recorder final : public VertexRecorder {
  public:
   Recorder(const Layout& numbers, std::shared_ptr<const Brightness> brightness, double level)
@@ -100,19 +112,6 @@ class ConditionalSplineTrainer::Recorder final : public VertexRecorder {
   const Layout& m_numbers;
   const std::shared_ptr<const Brightness> m_before;
   const double m_level;
-
- public:
-  /// Keeps an example of less than `level` with a probability of what it has of that. Chance belongs to its numbers,
-  /// whatever thread they came from, and to the level.
-  static bool survives(Example& example, double level) {
-    if (!(example.weight < level)) return true;
-    const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x)}; };
-    const std::uint64_t key = sample_key(bits(example.y[0]) << 32 | bits(example.y[1]), bits(example.y[2]));
-    const auto salt = std::bit_cast<std::uint32_t>(static_cast<float>(level));
-    if (sample_double(key, salt) * level >= static_cast<double>(example.weight)) return false;
-    example.weight = static_cast<float>(level);
-    return true;
-  }
 };
 
 ConditionalSplineTrainer::ConditionalSplineTrainer(const ConditionalSplineSettings& settings, double uniform,
@@ -159,7 +158,7 @@ void ConditionalSplineTrainer::merge(VertexRecorder& recorder) {
 void ConditionalSplineTrainer::thin(Examples& examples, double level) const {
   std::erase_if(examples, [&](Example& example) {
     const auto& v = example.vertex.values;
-    return !Recorder::survives(example, level * m_brightness->at(Brightness::tile(v[13], v[14])));
+    return !survives(example, level * m_brightness->at(Brightness::tile(v[13], v[14])));
   });
 }
 

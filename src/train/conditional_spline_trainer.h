@@ -34,6 +34,7 @@ class ConditionalSplineTrainer final : public VertexTrainer {
   class Brightness;
   using Examples = std::vector<Example>;
 
+  static bool survives(Example& example, double level);
   void thin(Examples& examples, double level) const;
   void train(std::size_t which, std::size_t visits);
 
