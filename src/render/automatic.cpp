@@ -21,12 +21,12 @@ constexpr int kPlainCostSpp = 2;
 /// Samples per pixel by which contenders other than the first are judged.
 constexpr int kOthersSpp = 4;
 /// They are tried if as many as this are to be rendered, and if learning costs them less than such a share of it.
-constexpr double kOthersMinSpp = 200, kOthersMostFitting = 0.02;
-/// And must be so much better than the first, which has more to learn.
+constexpr double kOthersMinSpp = 500, kOthersMostFitting = 0.02;
+/// And must pay at once, and be so much better than the first, which has more to learn.
 constexpr double kOthersBetter = 1.5;
 /// After its first pass, where it knows little yet, a warp is given up only if its error times cost is so much worse;
 /// where light is rare, deviations of few samples come out too small besides.
-constexpr double kStillLearns = 0.3;
+constexpr double kStillLearns = 0.2;
 /// The pass before the second look, and how good the warp must be then: the plain pass that it is compared with was
 /// shorter, and looks better than it was.
 constexpr int kSecondLookSpp = 32;
@@ -133,7 +133,7 @@ void Automatic::judge(PassRecord& pass, const Measured& measured) {
     if (next_to_try()) return;
     const Contender* best = &m_contenders.front();
     for (const Contender& other : m_contenders)
-      if (gain(other) > kOthersBetter * gain(*best)) best = &other;
+      if (gain(other) > std::max(1.0, kOthersBetter * gain(*best))) best = &other;
     return choose(pass, gain(*best) < kStillLearns ? nullptr : best);
   }
   if (!m_settled && measured.done >= kSecondLookSpp) {

@@ -83,7 +83,7 @@ TEST(Automatic, StartsWithUniformNumbersAndKeepsAWarpThatPays) {
 }
 
 TEST(Automatic, GivesAWarpUpThatDoesNotPay) {
-  Render render{.errors = {{"", 1}, {"field", 3}}};
+  Render render{.errors = {{"", 1}, {"field", 4}}};
   render.run(64);
   EXPECT_THAT(render.drawn_by(), ElementsAre("", "", "", "", "field", "", ""));
   EXPECT_EQ(render.chosen(), "none");
@@ -119,6 +119,13 @@ TEST(Automatic, TheFirstHasMoreToLearnThanOthers) {
   Render render{.errors = {{"", 1}, {"field", 0.5}, {"other", 0.4}}};
   render.run(1024);
   EXPECT_EQ(render.chosen(), "field");
+}
+
+TEST(Automatic, OthersMustPayAtOnce) {
+  Render render{.errors = {{"", 1}, {"field", 2}, {"other", 0.8}}, .later_errors = {{30, 0.3}}};
+  render.run(1024);
+  EXPECT_EQ(render.passes[5].drawn_by, "other");
+  EXPECT_EQ(render.chosen(), "field") << "which has learned since";
 }
 
 TEST(Automatic, StopsLearningWhenItGainsNothing) {
