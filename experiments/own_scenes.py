@@ -8,7 +8,7 @@ from tool import compare, crop, folder_of, own_scene, render_reference
 
 FILM = {"size": "160x90", "max_depth": 6}
 SIZES = {**FILM, "spp": 128, "runs": 5}
-# Where Real NVP misses a caustic or a highlight in motion, its samples weigh up to 1 / this many times what a uniform one does.
+# Where a network misses a caustic, a highlight in motion or a light, its samples weigh up to 1 / this many times what a uniform one does.
 SHARE = {"uniform": 0.3}
 WARPS_4D = ["kdtree:film+bounce1", "realnvp:film+bounce1"]
 

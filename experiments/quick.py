@@ -13,6 +13,7 @@ import math
 import shutil
 import time
 
+from own_scenes import SHARE
 from significance import chance_of_mean
 from tables import column, mean, of_method
 from tool import SETTINGS, compare, own_scene, render_reference, train
@@ -100,7 +101,7 @@ def gallery():
     scene, film = own_scene("gallery"), {"size": "64x36", "max_depth": 2}
     measure = {"runs": SEEDS, "spp": 512, **render_reference("quick/gallery", scene, 4096, f"kdtree:{LIGHT}", examples=80000, **film)}
     methods = [f"{family}:{LIGHT}" for family in ("uniform", "kdtree", "realnvp")]
-    results = compare("quick/gallery", scene, methods, **film, **measure, examples=30000, **NETWORK)
+    results = compare("quick/gallery", scene, methods, **film, **measure, examples=30000, **SHARE, **NETWORK)
     yield "gallery: kdtree's choice of light beats uniform in relMSE", over(results, methods[1], methods[0], "relmse_raw")
     yield "gallery: realnvp's choice of light beats uniform in relMSE", over(results, methods[2], methods[0], "relmse_raw")
 
