@@ -28,6 +28,13 @@ constexpr std::uint64_t kCandidateStream = 0x63616e6469640003u;
 /// More candidates than this, 256 MB of them, are gathered and resampled in chunks of so many, where the family allows.
 constexpr std::uint64_t kChunk = std::uint64_t{1} << 26;
 
+/// What a path costs with a warp, over what one costs without, by count of operations. The field: looking every vertex
+/// up, two densities, what half of the paths teach, and longer paths with more light to look for, against two rays, a
+/// BSDF and a light. Of the first hit alone: two look-ups in three trees, or a network, and what paths teach.
+constexpr double kFieldCost = 1.85, kFirstHitTreeCost = 1.25, kFirstHitSplineCost = 1.5;
+/// Paths that cost as much as growing the trees, and training the spline, after one of the first passes.
+constexpr double kFirstHitTreeFit = 4e4, kFirstHitSplineFit = 6e4;
+
 }  // namespace
 
 Method parse_method(const std::string& text) {
@@ -156,12 +163,12 @@ std::unique_ptr<VertexTrainer> MethodTrainer::conditional_trainer(const Method& 
 std::vector<Contender> MethodTrainer::contenders(std::unique_ptr<VertexTrainer> field,
                                                  std::shared_ptr<const VertexWarp> warp) const {
   std::vector<Contender> all;
-  all.push_back({"field", std::move(field), 1.85, 0, std::move(warp)});
+  all.push_back({"field", std::move(field), kFieldCost, 0, std::move(warp)});
   const auto add = [&](const char* name, double path_cost, double fit_cost) {
     all.push_back({name, conditional_trainer(parse_method(name)), path_cost, fit_cost});
   };
-  add("kdtree:bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1", 1.25, 4e4);
-  add("spline:bounce1.lobe+bounce1", 1.5, 6e4);
+  add("kdtree:bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1", kFirstHitTreeCost, kFirstHitTreeFit);
+  add("spline:bounce1.lobe+bounce1", kFirstHitSplineCost, kFirstHitSplineFit);
   return all;
 }
 

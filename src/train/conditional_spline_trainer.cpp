@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "core/vertex_context_buffer.h"
+#include "train/scattering_stride.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -171,10 +172,7 @@ void ConditionalSplineTrainer::train(std::size_t which, std::size_t visits) {
   ExampleBlocks batch;
   batch.resize(batch_size, 3, static_cast<std::size_t>(m_shape->flow.context_rows()));
   std::vector<VertexContextBuffer> buffers(batch.count);
-  // A stride that comes to all of them, each far from the one before: their number over the golden ratio, or the next
-  // that has no divisor in common with it.
-  auto stride = static_cast<std::size_t>(0.6180339887498949 * static_cast<double>(n));
-  while (std::gcd(stride, n) != 1) ++stride;
+  const std::size_t stride = scattering_stride(n);
   const auto first_step = static_cast<std::size_t>(m_optimisers[which].steps());
   for (std::size_t step = 0; step < steps; ++step) {
     const auto example = [&](std::size_t i) -> const Example& {

@@ -10,6 +10,7 @@
 #include "core/vertex_context_buffer.h"
 #include "nn/adam.h"
 #include "nn/dense.h"
+#include "train/scattering_stride.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -232,10 +233,7 @@ void NeuralTrainer::train() {
   // Each once, or twice where there are few.
   const std::size_t visits = std::max(n, std::min(2 * n, static_cast<std::size_t>(m_settings.min_visits)));
   const std::size_t steps = visits / batch;
-  // A stride that comes to all of them, each far from the one before: their number over the golden ratio, or the next
-  // that has no divisor in common with it.
-  auto stride = static_cast<std::size_t>(0.6180339887498949 * static_cast<double>(n));
-  while (std::gcd(stride, n) != 1) ++stride;
+  const std::size_t stride = scattering_stride(n);
   for (std::size_t s = 0; s < steps; ++s) {
     const double rate = m_settings.rate * std::pow(0.1, static_cast<double>(s) / static_cast<double>(steps));
     step(s * batch % n * stride % n, stride, rate);
