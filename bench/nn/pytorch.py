@@ -1,4 +1,5 @@
-"""The same networks in PyTorch, one thread: forward without gradients, and a step of forward, backward and Adam.
+"""The same networks in PyTorch, one thread: forward without gradients, and a step of forward, backward and Adam
+in floats and with bfloat16 where PyTorch sees fit.
 
   pytorch.py      one line of JSON: nanoseconds a sample by width
 """
@@ -37,14 +38,17 @@ def forward(width, batch):
         return best(lambda: net(x), batch, 200)
 
 
-def train(width, batch):
-    net, x = Net(width), torch.rand(batch, width)
+def train(width, batch, autocast):
+    net, x = Net(width), torch.rand(batch, width, requires_grad=True)  # a coupling below needs its gradient
     optimiser = torch.optim.Adam(net.parameters(), lr=1e-9)
     out = torch.rand(batch, width)
 
     def step():
         optimiser.zero_grad(set_to_none=True)
-        net(x).backward(out)
+        x.grad = None
+        with torch.autocast("cpu", dtype=torch.bfloat16, enabled=autocast):
+            y = net(x)
+        y.backward(out.to(y.dtype))
         optimiser.step()
 
     return best(step, batch, 50)
@@ -53,5 +57,6 @@ def train(width, batch):
 # Forward in the batch that suits it; training in ours, since the batch is part of the method.
 print(json.dumps({
     "forward": {width: min(forward(width, batch) for batch in (64, 512, 2048, 8192)) for width in (32, 64, 128)},
-    "train": {width: train(width, 2048) for width in (32, 64, 128)},
+    "train": {width: train(width, 2048, False) for width in (32, 64, 128)},
+    "train_bf16": {width: train(width, 2048, True) for width in (32, 64, 128)},
 }))  # fmt: skip

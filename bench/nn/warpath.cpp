@@ -14,7 +14,8 @@ using namespace warpath;
 using namespace warpath::nn;
 
 struct Net {
-  explicit Net(int width) : net(width, width, 2, width, Norm::none), parameters(net.parameter_count()) {
+  explicit Net(int width, Products products = fastest_products())
+      : net(width, width, 2, width, Norm::none, products), parameters(net.parameter_count()) {
     net.initialise(parameters.data(), 1, 1);
     gradients = m = v = parameters;
     std::fill(m.begin(), m.end(), 0.0f);
@@ -22,15 +23,14 @@ struct Net {
     packed.resize(net.packed_count());
     back.resize(net.packed_back_count());
     net.pack(parameters.data(), packed.data());
-    net.pack_back(parameters.data(), back.data());
     x.assign(static_cast<std::size_t>(width * kBlock), 0.5f);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = static_cast<float>(i * 2654435761u % 1000) * 1e-3f;
-    xt = d_x = out = x;
+    d_x = out = x;
     scratch.resize(net.scratch_count());
     activations.resize(net.activation_count());
   }
   ResidualNet net;
-  AlignedVector<float> parameters, gradients, m, v, packed, back, x, xt, d_x, out, scratch, activations;
+  AlignedVector<float> parameters, gradients, m, v, packed, back, x, d_x, out, scratch, activations;
 };
 
 void report(benchmark::State& state, double flops) {
@@ -50,28 +50,29 @@ void forward(benchmark::State& state) {
 }
 
 // A step of 32 blocks (2,048 samples): forward, backward, Adam, packing.
-void train(benchmark::State& state) {
-  Net n(static_cast<int>(state.range(0)));
+void train(benchmark::State& state, Products products) {
+  Net n(static_cast<int>(state.range(0)), products);
   constexpr int blocks = 32;
   int step = 0;
+  n.net.pack_for_training(n.parameters.data(), n.packed.data(), n.back.data());
   for (auto _ : state) {
     for (int b = 0; b < blocks; ++b) {
-      n.net.forward(n.packed.data(), n.x.data(), n.activations.data(), n.out.data());
-      transpose(n.net.inputs(), n.x.data(), n.xt.data());
-      n.net.backward(n.back.data(), n.xt.data(), n.activations.data(), n.out.data(), n.gradients.data(), b > 0,
-                     n.d_x.data(), false, n.scratch.data());
+      std::copy(n.x.begin(), n.x.end(), n.activations.begin());
+      n.net.forward(n.packed.data(), n.activations.data(), n.out.data());
+      n.net.backward(n.back.data(), n.activations.data(), n.out.data(), n.gradients.data(), b > 0, n.d_x.data(), false,
+                     n.scratch.data());
     }
     adam_step(Adam{.rate = 1e-9f}, ++step, n.net.parameter_count(), n.gradients.data(), n.parameters.data(), n.m.data(),
               n.v.data());
-    n.net.pack(n.parameters.data(), n.packed.data());
-    n.net.pack_back(n.parameters.data(), n.back.data());
+    n.net.pack_for_training(n.parameters.data(), n.packed.data(), n.back.data());
     benchmark::ClobberMemory();
   }
   report(state, 6.0 * kBlock * blocks * static_cast<double>(n.net.multiply_adds()));
 }
 
 BENCHMARK(forward)->Arg(32)->Arg(64)->Arg(128);
-BENCHMARK(train)->Arg(32)->Arg(64)->Arg(128);
+BENCHMARK_CAPTURE(train, floats, Products::floats)->Arg(32)->Arg(64)->Arg(128);
+BENCHMARK_CAPTURE(train, fastest, fastest_products())->Arg(32)->Arg(64)->Arg(128);
 
 }  // namespace
 

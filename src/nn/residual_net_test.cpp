@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -47,13 +48,14 @@ struct Case {
   std::string target;
   int inputs, width, blocks, outputs;
   Norm norm;
+  Products products = Products::floats;
 };
 
 class ResidualNetTest : public testing::TestWithParam<Case> {
  protected:
   Case m_case = GetParam();
   ForceSimdTarget m_target{m_case.target};
-  ResidualNet m_net{m_case.inputs, m_case.width, m_case.blocks, m_case.outputs, m_case.norm};
+  ResidualNet m_net{m_case.inputs, m_case.width, m_case.blocks, m_case.outputs, m_case.norm, m_case.products};
 
   Floats parameters() const {
     Floats p(m_net.parameter_count());
@@ -69,6 +71,25 @@ class ResidualNetTest : public testing::TestWithParam<Case> {
     Floats x(static_cast<std::size_t>(rows * kBlock));
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = 2 * sample_float(key, static_cast<std::uint32_t>(i)) - 1;
     return x;
+  }
+  struct Trained {
+    Floats out, gradients, d_x;
+  };
+  /// Forward and backward, twice, the second time added to the first: the mean of both.
+  Trained train(const Floats& p, const Floats& x, const Floats& g) const {
+    Floats packed(m_net.packed_count()), back(m_net.packed_back_count()), activations(m_net.activation_count());
+    Floats scratch(m_net.scratch_count(), 5.0f);
+    Trained t{Floats(g.size()), Floats(p.size(), 7.0f), Floats(x.size(), 1.0f)};
+    m_net.pack_for_training(p.data(), packed.data(), back.data());
+    for (const bool again : {false, true}) {
+      std::copy(x.begin(), x.end(), activations.begin());
+      m_net.forward(packed.data(), activations.data(), t.out.data());
+      m_net.backward(back.data(), activations.data(), g.data(), t.gradients.data(), again, t.d_x.data(), again,
+                     scratch.data());
+    }
+    for (float& v : t.gradients) v /= 2;
+    for (float& v : t.d_x) v /= 2;
+    return t;
   }
   Doubles sample(const Floats& x, int rows, std::size_t s) const {
     Doubles v;
@@ -86,6 +107,7 @@ std::vector<Case> cases() {
       all.push_back({target, 0, 16, 2, 1, norm});
       all.push_back({target, 18, 32, 2, 5, norm});
       all.push_back({target, 2, 48, 0, 3, norm});
+      all.push_back({target, 66, 64, 1, 98, norm});
     }
   return all;
 }
@@ -97,13 +119,11 @@ INSTANTIATE_TEST_SUITE_P(Nets, ResidualNetTest, testing::ValuesIn(cases()), [](c
 TEST_P(ResidualNetTest, ForwardAgreesWithPlainLoops) {
   const Floats p = parameters(), x = block(m_case.inputs, 4);
   const Doubles exact(p.begin(), p.end());
-  Floats packed(m_net.packed_count()), activations(m_net.activation_count());
-  Floats out(static_cast<std::size_t>(m_case.outputs * kBlock)), inferred(out.size());
+  Floats packed(m_net.packed_count()), out(static_cast<std::size_t>(m_case.outputs * kBlock));
   Floats scratch(static_cast<std::size_t>(2 * m_case.width * kBlock));
   m_net.pack(p.data(), packed.data());
-  m_net.forward(packed.data(), x.data(), activations.data(), out.data());
-  m_net.infer(packed.data(), x.data(), scratch.data(), inferred.data());
-  EXPECT_EQ(out, inferred);
+  m_net.infer(packed.data(), x.data(), scratch.data(), out.data());
+  EXPECT_EQ(out, train(p, x, block(m_case.outputs, 5)).out);
   for (std::size_t s = 0; s < kBlock; ++s) {
     const Doubles y = reference(m_net, exact, sample(x, m_case.inputs, s));
     for (std::size_t o = 0; o < y.size(); ++o)
@@ -115,15 +135,7 @@ TEST_P(ResidualNetTest, ForwardAgreesWithPlainLoops) {
 // changes sides within the step: then the difference is skipped, which must stay rare.
 TEST_P(ResidualNetTest, BackwardAgreesWithFiniteDifferences) {
   const Floats p = parameters(), x = block(m_case.inputs, 4), g = block(m_case.outputs, 5);
-  Floats packed(m_net.packed_count()), back(m_net.packed_back_count()), activations(m_net.activation_count());
-  Floats out(g.size()), gradients(p.size(), 7.0f), d_x(x.size(), 1.0f), scratch(m_net.scratch_count());
-  Floats xt(static_cast<std::size_t>(padded_inputs(m_case.inputs) * kBlock));
-  m_net.pack(p.data(), packed.data());
-  m_net.pack_back(p.data(), back.data());
-  m_net.forward(packed.data(), x.data(), activations.data(), out.data());
-  transpose(m_case.inputs, x.data(), xt.data());
-  m_net.backward(back.data(), xt.data(), activations.data(), g.data(), gradients.data(), false, d_x.data(), true,
-                 scratch.data());
+  auto [out, gradients, d_x] = train(p, x, g);
   m_net.unfold(p.data(), gradients.data());
 
   const Doubles exact(p.begin(), p.end());
@@ -170,9 +182,67 @@ TEST_P(ResidualNetTest, BackwardAgreesWithFiniteDifferences) {
   }
   for (std::size_t k = 0; k < static_cast<std::size_t>(m_case.inputs); ++k)
     for (std::size_t s = 0; s < kBlock; s += 13)
-      compare([&](double h) { return loss(exact, s, k, h); }, static_cast<double>(d_x[k * kBlock + s]) - 1,
+      compare([&](double h) { return loss(exact, s, k, h); }, static_cast<double>(d_x[k * kBlock + s]),
               fmt::format("input {} of sample {}", k, s));
   EXPECT_LT(skipped, checked / 5 + 3);
+}
+
+/// Root mean square of a - b, and the largest of them, over the root mean square of b.
+std::array<double, 2> relative(const Floats& a, const Floats& b, std::size_t from, std::size_t count) {
+  double squares = 0, errors = 0, most = 0;
+  for (std::size_t i = from; i < from + count; ++i) {
+    const double error = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+    squares += static_cast<double>(b[i]) * static_cast<double>(b[i]);
+    errors += error * error;
+    most = std::max(most, std::abs(error));
+  }
+  const double n = static_cast<double>(count), scale = std::sqrt(squares / n) + 1e-20;
+  return {std::sqrt(errors / n) / scale, most / scale};
+}
+
+class Bf16Test : public ResidualNetTest {
+  void SetUp() override {
+    if (fastest_products_of_cpu != Products::bf16) GTEST_SKIP() << "this CPU does not multiply bfloat16";
+  }
+  static const inline Products fastest_products_of_cpu = fastest_products();
+};
+INSTANTIATE_TEST_SUITE_P(Nets, Bf16Test,
+                         testing::Values(Case{"AVX2", 3, 16, 1, 2, Norm::actnorm, Products::bf16},
+                                         Case{"AVX2", 0, 16, 2, 1, Norm::actnorm, Products::bf16},
+                                         Case{"AVX2", 17, 32, 2, 5, Norm::none, Products::bf16},
+                                         Case{"AVX2", 2, 48, 0, 3, Norm::none, Products::bf16},
+                                         Case{"AVX2", 66, 64, 1, 98, Norm::none, Products::bf16}));
+
+// bfloat16 has 8 significant bits: a rounding errs by 2^-9 at most, some 2^-10 of a number on average. Where it would
+// move a sample to the other side of a ReLU, the gradients are those of another path: biases keep them off.
+TEST_P(Bf16Test, TrainsAsFloatsDo) {
+  Floats p = parameters();
+  for (const DenseLayer& l : m_net.layers()) {
+    for (std::size_t i = l.weight; i < l.bias; ++i) p[i] *= 0.1f;
+    for (std::size_t o = 0; o < static_cast<std::size_t>(l.outputs); ++o)
+      p[l.bias + o] += sample_float(8, static_cast<std::uint32_t>(o)) < 0.7f ? 4.0f : -4.0f;
+  }
+  const Floats x = block(m_case.inputs, 4);
+  Floats g = block(m_case.outputs, 5);
+  for (float& v : g) v += 1.5f;  // sums that do not cancel
+  const Trained rounded = train(p, x, g);
+  m_net = ResidualNet(m_case.inputs, m_case.width, m_case.blocks, m_case.outputs, m_case.norm, Products::floats);
+  const Trained exact = train(p, x, g);
+  const auto compare = [](const Floats& a, const Floats& b, std::size_t from, std::size_t count, const char* what) {
+    const auto [error, most] = relative(a, b, from, count);
+    EXPECT_LT(error, 0.01) << what << " " << from;
+    EXPECT_LT(most, 0.06) << what << " " << from;
+  };
+  EXPECT_NE(rounded.out, exact.out);
+  compare(rounded.out, exact.out, 0, exact.out.size(), "outputs");
+  if (m_case.inputs > 0) compare(rounded.d_x, exact.d_x, 0, exact.d_x.size(), "inputs");
+  for (const DenseLayer& l : m_net.layers()) {
+    const auto outputs = static_cast<std::size_t>(l.outputs);
+    if (l.inputs > 0)
+      compare(rounded.gradients, exact.gradients, l.weight, outputs * static_cast<std::size_t>(padded_inputs(l.inputs)),
+              "weights");
+    compare(rounded.gradients, exact.gradients, l.bias, outputs, "bias");
+  }
 }
 
 class ActnormTest : public ResidualNetTest {};

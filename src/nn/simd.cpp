@@ -7,7 +7,10 @@
 namespace warpath::nn {
 namespace {
 
+bool g_forced = false;
+
 void use(std::int64_t targets) {
+  g_forced = targets != 0;
   hwy::SetSupportedTargetsForTest(targets);  // 0 gives the CPU's own back
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
@@ -30,5 +33,7 @@ ForceSimdTarget::ForceSimdTarget(const std::string& name) {
 }
 
 ForceSimdTarget::~ForceSimdTarget() { use(0); }
+
+bool ForceSimdTarget::any() { return g_forced; }
 
 }  // namespace warpath::nn

@@ -39,6 +39,8 @@ class ForceSimdTarget {
   ~ForceSimdTarget();
   ForceSimdTarget(const ForceSimdTarget&) = delete;
   ForceSimdTarget& operator=(const ForceSimdTarget&) = delete;
+
+  static bool any();  ///< whether one lives
 };
 
 }  // namespace warpath::nn

@@ -41,7 +41,7 @@ struct NeuralTrainer::Means {
 };
 
 struct NeuralTrainer::Scratch {
-  nn::AlignedVector<float> x, transposed_x, activations, h, transposed_h, d_h, backward;
+  nn::AlignedVector<float> activations, h, transposed_h, d_h, backward;
   VertexContextBuffer context;
   std::array<std::uint32_t, kBlock> cells;
 };
@@ -128,8 +128,6 @@ NeuralTrainer::NeuralTrainer(const NeuralSettings& settings, int light_parts, st
   const nn::ResidualNet& trunk = m_network->trunk();
   const auto rows = [](int count) { return static_cast<std::size_t>(count * kBlock); };
   for (Scratch& s : m_scratch) {
-    s.x.resize(rows(trunk.inputs()));
-    s.transposed_x.resize(rows(nn::padded_inputs(trunk.inputs())));
     s.activations.resize(trunk.activation_count());
     for (auto* h : {&s.h, &s.transposed_h, &s.d_h}) h->resize(rows(kNodeFeatures));
     s.backward.resize(trunk.scratch_count());
@@ -180,9 +178,8 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
     for (std::size_t k = 0; k < kBlock; ++k) s.context.add(example(k).vertex);
     const VertexContext context = s.context.view();
     m_field->locate(context, kBlock, s.cells.data());
-    encode_vertices(m_box, network.shape().position_bins, context, vertices, s.x.data());
-    nn::transpose(trunk.inputs(), s.x.data(), s.transposed_x.data());
-    trunk.forward(m_packed.data(), s.x.data(), s.activations.data(), s.h.data());
+    encode_vertices(m_box, network.shape().position_bins, context, vertices, s.activations.data());
+    trunk.forward(m_packed.data(), s.activations.data(), s.h.data());
     nn::transpose(kNodeFeatures, s.h.data(), s.transposed_h.data());
     for (std::size_t k = 0; k < kBlock; ++k) {
       const Example& v = example(k);
@@ -199,15 +196,14 @@ void NeuralTrainer::gradients_of_slot(std::size_t slot, std::size_t first, std::
       }
       for (std::size_t f = 0; f < kNodeFeatures; ++f) s.d_h[f * kBlock + k] = d_h[f];
     }
-    trunk.backward(m_packed_back.data(), s.transposed_x.data(), s.activations.data(), s.d_h.data(), gradients, true,
-                   nullptr, false, s.backward.data());
+    trunk.backward(m_packed_back.data(), s.activations.data(), s.d_h.data(), gradients, true, nullptr, false,
+                   s.backward.data());
   }
 }
 
 void NeuralTrainer::step(std::size_t first, std::size_t stride, double rate) {
   const nn::ResidualNet& trunk = m_network->trunk();
-  trunk.pack(m_parameters.data(), m_packed.data());
-  trunk.pack_back(m_parameters.data(), m_packed_back.data());
+  trunk.pack_for_training(m_parameters.data(), m_packed.data(), m_packed_back.data());
   float* to = m_transposed.data();
   for (std::size_t h = 0; h < VertexNetwork::kHeads; ++h) {
     transpose_nodes(m_network->tree(h), m_parameters.data() + m_network->first_of_head(h), to);

@@ -52,6 +52,7 @@ Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings
       coupling.packed.push_back(std::exchange(m_packed, m_packed + net.packed_count()));
       coupling.packed_back.push_back(std::exchange(m_packed_back, m_packed_back + net.packed_back_count()));
       coupling.activations.push_back(std::exchange(m_activations, m_activations + net.activation_count()));
+      m_backward_scratch = std::max(m_backward_scratch, net.scratch_count());
       coupling.nets.push_back(std::move(net));
     }
     coupling.scales = std::exchange(m_parameters, m_parameters + static_cast<std::size_t>(nn::round_up(moved, 16)));
@@ -126,8 +127,12 @@ void Flow::pack_coupling(std::size_t c, const float* parameters, PackedParameter
   const Coupling& coupling = m_couplings[c];
   for (std::size_t n = 0; n < coupling.nets.size(); ++n) {
     const float* at = parameters + coupling.parameters[n];
-    coupling.nets[n].pack(at, packed.forward.data() + coupling.packed[n]);
-    if (!packed.back.empty()) coupling.nets[n].pack_back(at, packed.back.data() + coupling.packed_back[n]);
+    float* forward = packed.forward.data() + coupling.packed[n];
+    if (packed.back.empty()) {
+      coupling.nets[n].pack(at, forward);
+    } else {
+      coupling.nets[n].pack_for_training(at, forward, packed.back.data() + coupling.packed_back[n]);
+    }
   }
   std::copy_n(parameters + coupling.scales, coupling.moved.size(), packed.scales.data() + c * m_most_moved);
 }
@@ -202,28 +207,24 @@ void Flow::inverse(const PackedParameters& packed, const double* y, double* z, d
   for (int i = 0; i < m_dims; ++i) shift_logit(y + i * kBlock, row(start, i), row(v, i), z + i * kBlock, log_det);
 }
 
-// Training: v before each coupling and at the end, every coupling's heads and activations; then inputs, their transpose
-// and gradient, gradients of heads and v, weights, log q, and what ResidualNet::backward needs.
+// Training: v before each coupling and at the end, every coupling's heads and activations; then gradients of heads, v
+// and inputs, weights, log q, and what ResidualNet::backward needs.
 std::size_t Flow::training_scratch_count() const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
-  return m_activations + m_couplings[0].nets[0].scratch_count() +
-         ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + 3 * inputs + 3) * kBlock;
+  return m_activations + m_backward_scratch +
+         ((couplings + 2) * dims + (couplings + 1) * 2 * m_most_moved + m_most_inputs + 3) * kBlock;
 }
 
 double Flow::train_block(const PackedParameters& packed, const double* y, const float* /*context*/, const float* weight,
                          const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
                          float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const auto take = [&scratch](std::size_t rows) { return std::exchange(scratch, scratch + rows * kBlock); };
   float* const v = take((couplings + 1) * dims);
   float* const d_v = take(dims);
   float* const heads = take(couplings * 2 * m_most_moved);
   float* const d_heads = take(2 * m_most_moved);
-  float* const x = take(inputs);
-  float* const xt = take(inputs);
-  float* const d_x = take(inputs);
+  float* const d_x = take(m_most_inputs);
   float* const sample_weight = take(1);
   double* const log_q = reinterpret_cast<double*>(take(2));
   float* const activations = scratch;
@@ -241,9 +242,12 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
     const std::size_t moved = coupling.moved.size();
     float* h = heads + c * 2 * m_most_moved * kBlock;
     float* next = now - dims * kBlock;
+    float* const x = activations + coupling.activations[0];
     encode_kept(coupling, now, x);
+    for (std::size_t n = 1; n < coupling.nets.size(); ++n)
+      std::copy_n(x, coupling.nets[0].inputs() * kBlock, activations + coupling.activations[n]);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
-      coupling.nets[n].forward(packed.forward.data() + coupling.packed[n], x, activations + coupling.activations[n],
+      coupling.nets[n].forward(packed.forward.data() + coupling.packed[n], activations + coupling.activations[n],
                                row(h, n * moved));
     std::copy_n(now, dims * kBlock, next);
     for (std::size_t k = 0; k < moved; ++k)
@@ -266,10 +270,8 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
       float& sum = gradients[coupling.scales + k];
       sum = accumulate ? sum + d_scale : d_scale;
     }
-    encode_kept(coupling, now, x);
-    nn::transpose(coupling.nets[0].inputs(), x, xt);
     for (std::size_t n = 0; n < coupling.nets.size(); ++n)
-      coupling.nets[n].backward(packed.back.data() + coupling.packed_back[n], xt, activations + coupling.activations[n],
+      coupling.nets[n].backward(packed.back.data() + coupling.packed_back[n], activations + coupling.activations[n],
                                 row(d_heads, n * moved), gradients + coupling.parameters[n], accumulate, d_x, n > 0,
                                 rest);
     encode_kept_backward(coupling, now, d_x, d_v);

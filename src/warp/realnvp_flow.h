@@ -66,7 +66,7 @@ class Flow final : public CouplingFlow {
   RealNvpSettings m_settings;
   std::vector<Coupling> m_couplings;
   std::size_t m_parameters = 0, m_packed = 0, m_packed_back = 0, m_activations = 0, m_scales = 0;
-  std::size_t m_most_inputs = 0, m_most_moved = 0;
+  std::size_t m_most_inputs = 0, m_most_moved = 0, m_backward_scratch = 0;
 };
 
 }  // namespace warpath::realnvp

@@ -78,6 +78,7 @@ Flow::Flow(int dims, const SplineSettings& settings, int context_rows)
     coupling.activations = std::exchange(m_activations, m_activations + coupling.net.activation_count());
     m_most_inputs = std::max(m_most_inputs, static_cast<std::size_t>(coupling.net.inputs()));
     m_most_outputs = std::max(m_most_outputs, static_cast<std::size_t>(coupling.net.outputs()));
+    m_backward_scratch = std::max(m_backward_scratch, coupling.net.scratch_count());
     m_couplings.push_back(std::move(coupling));
   }
 }
@@ -120,9 +121,10 @@ void Flow::resize(PackedParameters& packed, bool back) const {
 
 void Flow::pack_coupling(std::size_t c, const float* parameters, PackedParameters& packed) const {
   const Coupling& coupling = m_couplings[c];
-  coupling.net.pack(parameters + coupling.parameters, packed.forward.data() + coupling.packed);
-  if (!packed.back.empty())
-    coupling.net.pack_back(parameters + coupling.parameters, packed.back.data() + coupling.packed_back);
+  const float* const from = parameters + coupling.parameters;
+  float* const forward = packed.forward.data() + coupling.packed;
+  if (packed.back.empty()) return coupling.net.pack(from, forward);
+  coupling.net.pack_for_training(from, forward, packed.back.data() + coupling.packed_back);
 }
 
 void Flow::put_context(const float* context, float* x) const {
@@ -191,35 +193,30 @@ void Flow::inverse(const PackedParameters& packed, const double* y, const float*
   }
 }
 
-// v before each coupling and at the end, every coupling's heads and activations; then gradients of heads and v, inputs,
-// their transpose and gradient, weights, log q, and what ResidualNet::backward needs.
+// v before each coupling and at the end, every coupling's heads and activations; then gradients of heads, v and inputs,
+// weights, log q, and what ResidualNet::backward needs.
 std::size_t Flow::training_scratch_count() const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
-  return m_activations + m_couplings[0].net.scratch_count() +
-         ((couplings + 2) * dims + (couplings + 1) * m_most_outputs + 3 * inputs + 3) * kBlock;
+  return m_activations + m_backward_scratch +
+         ((couplings + 2) * dims + (couplings + 1) * m_most_outputs + m_most_inputs + 3) * kBlock;
 }
 
 double Flow::train_block(const PackedParameters& packed, const double* y, const float* context, const float* weight,
                          const float* target, const FlowObjective& objective, float* gradients, bool accumulate,
                          float* scratch) const {
   const std::size_t dims = static_cast<std::size_t>(m_dims), couplings = m_couplings.size();
-  const std::size_t inputs = static_cast<std::size_t>(nn::padded_inputs(static_cast<int>(m_most_inputs)));
   const int bins = m_settings.bins, rows = head_rows(bins), encoded = encoded_rows(m_settings.encoding_bins);
   const auto take = [&scratch](std::size_t count) { return std::exchange(scratch, scratch + count * kBlock); };
   float* const v = take((couplings + 1) * dims);
   float* const d_v = take(dims);
   float* const heads = take(couplings * m_most_outputs);
   float* const d_heads = take(m_most_outputs);
-  float* const x = take(inputs);
-  float* const xt = take(inputs);
-  float* const d_x = take(inputs);
+  float* const d_x = take(m_most_inputs);
   float* const sample_weight = take(1);
   double* const log_q = reinterpret_cast<double*>(take(2));
   float* const activations = scratch;
   float* const rest = activations + m_activations;
 
-  put_context(context, x);
   // y -> z, keeping everything. v + c dims: the numbers above coupling c, v itself: those of z.
   float* now = row(v, couplings * dims);
   std::fill_n(log_q, kBlock, 0.0);
@@ -228,8 +225,10 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
     const Coupling& coupling = m_couplings[c];
     float* const h = row(heads, c * m_most_outputs);
     float* const next = now - dims * kBlock;
+    float* const x = activations + coupling.activations;
+    put_context(context, x);
     encode_kept(coupling, now, x);
-    coupling.net.forward(packed.forward.data() + coupling.packed, x, activations + coupling.activations, h);
+    coupling.net.forward(packed.forward.data() + coupling.packed, x, h);
     std::copy_n(now, dims * kBlock, next);
     for (std::size_t k = 0; k < coupling.moved.size(); ++k)
       squeeze_for_training(bins, row(h, static_cast<int>(k) * rows), row(now, coupling.moved[k]),
@@ -245,9 +244,7 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
     for (std::size_t k = 0; k < coupling.moved.size(); ++k)
       squeeze_backward(bins, row(h, static_cast<int>(k) * rows), row(now, coupling.moved[k]), sample_weight,
                        row(d_v, coupling.moved[k]), row(d_heads, static_cast<int>(k) * rows));
-    encode_kept(coupling, now, x);
-    nn::transpose(coupling.net.inputs(), x, xt);
-    coupling.net.backward(packed.back.data() + coupling.packed_back, xt, activations + coupling.activations, d_heads,
+    coupling.net.backward(packed.back.data() + coupling.packed_back, activations + coupling.activations, d_heads,
                           gradients + coupling.parameters, accumulate, coupling.sees_moved ? d_x : nullptr, false,
                           rest);
     for (std::size_t k = 0; coupling.sees_moved && k < coupling.kept.size(); ++k)

@@ -70,7 +70,7 @@ class Flow final : public CouplingFlow {
   SplineSettings m_settings;
   std::vector<Coupling> m_couplings;
   std::size_t m_parameters = 0, m_packed = 0, m_packed_back = 0, m_activations = 0;
-  std::size_t m_most_inputs = 0, m_most_outputs = 0;
+  std::size_t m_most_inputs = 0, m_most_outputs = 0, m_backward_scratch = 0;
 };
 
 }  // namespace warpath::spline
