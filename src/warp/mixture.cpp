@@ -65,7 +65,8 @@ void Mixture::sample(Batch<const double> z, std::span<const double> u, Batch<dou
     if (count == 0) continue;
     m_components[k].proposal->sample({&packed_z[first[k] * cols], count, cols}, {&packed_u[first[k]], count},
                                      {&packed_y[first[k] * cols], count, cols}, {&packed_q[first[k]], count});
-    for (std::size_t j = first[k]; j < first[k + 1]; ++j) packed_q[j] += std::log(m_components[k].weight);
+    const double log_weight = std::log(m_components[k].weight);
+    for (std::size_t j = first[k]; j < first[k + 1]; ++j) packed_q[j] += log_weight;
   }
   if (m_components.size() > 1) {
     for (std::size_t k = 0; k < m_components.size(); ++k) {
