@@ -49,6 +49,7 @@ HWY_INLINE void StoreGradient(Gradient to, int row, int s, __m512 even, __m512 o
 
 // What happens to the sums of two rows.
 struct Relu {
+  static constexpr int kRows = 2;
   Pair* y;
   HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
     const __m512i v = Interleave(Round(even, odd));
@@ -56,6 +57,7 @@ struct Relu {
   }
 };
 struct AddRelu {
+  static constexpr int kRows = 2;
   Pair* y;
   const Pair* skip;
   HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
@@ -64,6 +66,7 @@ struct AddRelu {
   }
 };
 struct Gate {
+  static constexpr int kRows = 2;
   Gradient to;
   const Pair* act;
   HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
@@ -74,6 +77,7 @@ struct Gate {
   }
 };
 struct AddGate {
+  static constexpr int kRows = 2;
   Gate gate;
   const Pair* skip;
   HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
@@ -83,10 +87,12 @@ struct AddGate {
 };
 // ... and to those of one row.
 struct Linear {
+  static constexpr int kRows = 1;
   float* y;
   HWY_INLINE void operator()(int row, int s, __m512 sum) const { _mm512_store_ps(y + row * kBlock + s, sum); }
 };
 struct Add {
+  static constexpr int kRows = 1;
   float* y;
   HWY_INLINE void operator()(int row, int s, __m512 sum) const {
     float* const at = y + row * kBlock + s;
@@ -121,49 +127,33 @@ struct Sums {
 };
 
 template <int R, int C, class F>
-HWY_INLINE void TileOfPairs(int inputs, const Pair* w, const Pair* x, int row, F f) {
+HWY_INLINE void Tile(int inputs, const Pair* w, const Pair* x, int row, F f) {
   for (int s = 0; s < kBlock; s += C * kLanes) {
     Sums<R, C> sums;
     sums.Compute(inputs, w, x + s);
     HWY_UNROLL(8)
-    for (int r = 0; r < R; r += 2) {
+    for (int r = 0; r < R; r += F::kRows) {
       HWY_UNROLL(4)
-      for (int c = 0; c < C; ++c) f(row + r, s + c * kLanes, sums.acc[r][c], sums.acc[r + 1][c]);
-    }
-  }
-}
-
-template <int R, int C, class F>
-HWY_INLINE void TileOfRows(int inputs, const Pair* w, const Pair* x, int row, F f) {
-  for (int s = 0; s < kBlock; s += C * kLanes) {
-    Sums<R, C> sums;
-    sums.Compute(inputs, w, x + s);
-    HWY_UNROLL(8)
-    for (int r = 0; r < R; ++r) {
-      HWY_UNROLL(4)
-      for (int c = 0; c < C; ++c) f(row + r, s + c * kLanes, sums.acc[r][c]);
+      for (int c = 0; c < C; ++c) {
+        if constexpr (F::kRows == 2) {
+          f(row + r, s + c * kLanes, sums.acc[r][c], sums.acc[r + 1][c]);
+        } else {
+          f(row + r, s + c * kLanes, sums.acc[r][c]);
+        }
+      }
     }
   }
 }
 
 template <class F>
-HWY_INLINE void LayerOfPairs(int inputs, int outputs, const Pair* w, const Pair* x, F f) {
+HWY_INLINE void Layer(int inputs, int outputs, const Pair* w, const Pair* x, F f) {
   for (int o = 0; o < outputs; o += kGroup, w += kGroup * (pairs(inputs) + 1)) {
     int row = 0;
     const int rows = HWY_MIN(outputs - o, kGroup);
-    for (; row + kGroup <= rows; row += kGroup) TileOfPairs<kGroup, kTileCols>(inputs, w + row, x, o + row, f);
-    for (; row < rows; row += 2) TileOfPairs<2, 4>(inputs, w + row, x, o + row, f);
-  }
-}
-
-template <class F>
-HWY_INLINE void LayerOfRows(int inputs, int outputs, const Pair* w, const Pair* x, F f) {
-  for (int o = 0; o < outputs; o += kGroup, w += kGroup * (pairs(inputs) + 1)) {
-    int row = 0;
-    const int rows = HWY_MIN(outputs - o, kGroup);
-    for (; row + kGroup <= rows; row += kGroup) TileOfRows<kGroup, kTileCols>(inputs, w + row, x, o + row, f);
-    for (; row + 2 <= rows; row += 2) TileOfRows<2, 4>(inputs, w + row, x, o + row, f);
-    for (; row < rows; ++row) TileOfRows<1, 4>(inputs, w + row, x, o + row, f);
+    for (; row + kGroup <= rows; row += kGroup) Tile<kGroup, kTileCols>(inputs, w + row, x, o + row, f);
+    for (; row + 2 <= rows; row += 2) Tile<2, 4>(inputs, w + row, x, o + row, f);
+    if constexpr (F::kRows == 1)
+      for (; row < rows; ++row) Tile<1, 4>(inputs, w + row, x, o + row, f);
   }
 }
 
@@ -327,13 +317,13 @@ void narrow(int rows, const float* x, Pair* to) {
 }
 
 void dense(int inputs, int outputs, const Pair* packed, const Pair* x, Pair* y, const Pair* skip) {
-  if (skip) return LayerOfPairs(inputs, outputs, packed, x, AddRelu{y, skip});
-  LayerOfPairs(inputs, outputs, packed, x, Relu{y});
+  if (skip) return Layer(inputs, outputs, packed, x, AddRelu{y, skip});
+  Layer(inputs, outputs, packed, x, Relu{y});
 }
 
 void dense_out(int inputs, int outputs, const Pair* packed, const Pair* x, float* y, bool accumulate) {
-  if (accumulate) return LayerOfRows(inputs, outputs, packed, x, Add{y});
-  LayerOfRows(inputs, outputs, packed, x, Linear{y});
+  if (accumulate) return Layer(inputs, outputs, packed, x, Add{y});
+  Layer(inputs, outputs, packed, x, Linear{y});
 }
 
 void narrow_gradient(int rows, const float* g, Gradient to) {
@@ -349,8 +339,8 @@ void narrow_gradient(int rows, const float* g, Gradient to) {
 void dense_back(int inputs, int outputs, const Pair* packed, const Pair* g, const Pair* skip, const Pair* act,
                 Gradient to) {
   const Gate gate{to, act};
-  if (skip) return LayerOfPairs(inputs, outputs, packed, g, AddGate{gate, skip});
-  LayerOfPairs(inputs, outputs, packed, g, gate);
+  if (skip) return Layer(inputs, outputs, packed, g, AddGate{gate, skip});
+  Layer(inputs, outputs, packed, g, gate);
 }
 
 void transpose(int rows, const Pair* x, Pair* xt) {
