@@ -14,9 +14,9 @@ using V = hn::Vec<D>;
 constexpr D d;
 constexpr int kLanes = hn::MaxLanes(D());
 // Register tile, neurons x vectors: 16 accumulators of 32 registers with AVX-512, 8 of 16 with AVX2. Both hide the
-// latency of the FMA units (4 cycles x 2) and need fewer loads than FMAs.
-constexpr int kTileRows = kLanes == 16 ? 8 : 4;
-constexpr int kTileCols = 2;
+// latency of the FMA units (4 cycles x 2) and need fewer loads than FMAs. Square tiles need the fewest.
+constexpr int kTileRows = 4;
+constexpr int kTileCols = kLanes == 16 ? 4 : 2;
 
 // max(v, 0) by integers, whose order among themselves is that of positive floats: another port than the FMAs'.
 HWY_INLINE V Positive(V v) {
@@ -201,9 +201,9 @@ HWY_INLINE void GradientRows(int panels, const float* g, const float* xt, float*
 
 void DenseGradient(int inputs, int outputs, const float* g, const float* xt, float* dw, float* db, bool accumulate) {
   const int stride = padded_inputs(inputs), panels = stride / 16;
+  constexpr int kRows = kLanes == 16 ? 8 : 4;
   int o = 0;
-  for (; o + kTileRows <= outputs; o += kTileRows)
-    GradientRows<kTileRows>(panels, g + o * kBlock, xt, dw + o * stride, accumulate);
+  for (; o + kRows <= outputs; o += kRows) GradientRows<kRows>(panels, g + o * kBlock, xt, dw + o * stride, accumulate);
   for (; o + 2 <= outputs; o += 2) GradientRows<2>(panels, g + o * kBlock, xt, dw + o * stride, accumulate);
   for (; o < outputs; ++o) GradientRows<1>(panels, g + o * kBlock, xt, dw + o * stride, accumulate);
   for (o = 0; o < outputs; ++o) {

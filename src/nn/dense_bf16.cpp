@@ -15,7 +15,7 @@ namespace warpath::nn::bf16 {
 namespace {
 
 constexpr int kLanes = 16;
-constexpr int kTileCols = 2;  // a tile is kGroup x 2 vectors: 16 accumulators
+constexpr int kTile = 4;  // rows and vectors of a tile: 16 accumulators
 
 HWY_INLINE __m512i Load(const Pair* p) { return _mm512_load_si512(p); }
 HWY_INLINE void Store(Pair* p, __m512i v) { _mm512_store_si512(p, v); }
@@ -150,7 +150,7 @@ HWY_INLINE void Layer(int inputs, int outputs, const Pair* w, const Pair* x, F f
   for (int o = 0; o < outputs; o += kGroup, w += kGroup * (pairs(inputs) + 1)) {
     int row = 0;
     const int rows = HWY_MIN(outputs - o, kGroup);
-    for (; row + kGroup <= rows; row += kGroup) Tile<kGroup, kTileCols>(inputs, w + row, x, o + row, f);
+    for (; row + kTile <= rows; row += kTile) Tile<kTile, kTile>(inputs, w + row, x, o + row, f);
     for (; row + 2 <= rows; row += 2) Tile<2, 4>(inputs, w + row, x, o + row, f);
     if constexpr (F::kRows == 1)
       for (; row < rows; ++row) Tile<1, 4>(inputs, w + row, x, o + row, f);
