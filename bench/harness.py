@@ -119,7 +119,7 @@ class Bench:
         return path
 
     def counters(self, name, benchmarks=".*"):
-        """Results of a Google Benchmark binary by name: of each the fastest of three, as pytorch.py has it, too."""
+        """Results of a Google Benchmark binary by name: of each the fastest of three, as the machine may have other work."""
         with tempfile.NamedTemporaryFile(suffix=".json") as out:
             command = [self.binary(name), f"--benchmark_filter={benchmarks}", f"--benchmark_out={out.name}", "--benchmark_repetitions=3"]
             subprocess.run(command, check=True, capture_output=True)

@@ -3,6 +3,8 @@
 #include <hwy/highway.h>
 #include <immintrin.h>
 
+#include <bit>
+
 namespace warpath::nn::bf16 {
 
 bool available() { return __builtin_cpu_supports("avx512bf16") && !ForceSimdTarget::any(); }
@@ -56,15 +58,6 @@ struct Relu {
     Store(y + row / 2 * kBlock + s, _mm512_max_epi16(v, _mm512_setzero_si512()));  // bit patterns are in order
   }
 };
-struct AddRelu {
-  static constexpr int kRows = 2;
-  Pair* y;
-  const Pair* skip;
-  HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
-    const __m512i more = Load(skip + row / 2 * kBlock + s);
-    Relu{y}(row, s, _mm512_add_ps(even, Even(more)), _mm512_add_ps(odd, Odd(more)));
-  }
-};
 struct Gate {
   static constexpr int kRows = 2;
   Gradient to;
@@ -76,13 +69,15 @@ struct Gate {
         _mm512_maskz_mov_ps(_mm512_test_epi32_mask(a, _mm512_set1_epi32(static_cast<int>(0xffff0000u))), odd));
   }
 };
-struct AddGate {
+/// F, of the sums and what `skip` holds.
+template <class F>
+struct WithSkip {
   static constexpr int kRows = 2;
-  Gate gate;
+  F f;
   const Pair* skip;
   HWY_INLINE void operator()(int row, int s, __m512 even, __m512 odd) const {
     const __m512i more = Load(skip + row / 2 * kBlock + s);
-    gate(row, s, _mm512_add_ps(even, Even(more)), _mm512_add_ps(odd, Odd(more)));
+    f(row, s, _mm512_add_ps(even, Even(more)), _mm512_add_ps(odd, Odd(more)));
   }
 };
 // ... and to those of one row.
@@ -262,8 +257,7 @@ HWY_INLINE void BiasGradient(int outputs, const Pair* g, float* db, bool accumul
 void pack(int inputs, int outputs, const float* weight, const float* gain, const float* bias, Pair* packed) {
   const int stride = padded_inputs(inputs), words = pairs(inputs);
   for (int o = 0; o < outputs; o += kGroup, packed += kGroup * (words + 1)) {
-    for (int r = 0; r < kGroup; ++r)
-      packed[r] = o + r < outputs ? static_cast<Pair>(_mm_cvtsi128_si32(_mm_castps_si128(_mm_set_ss(bias[o + r])))) : 0;
+    for (int r = 0; r < kGroup; ++r) packed[r] = o + r < outputs ? std::bit_cast<Pair>(bias[o + r]) : 0;
     for (int k = 0; k < stride; k += 16) {
       // 8 rows of 8 words, transposed.
       __m256i v[8], t[8];
@@ -317,8 +311,9 @@ void narrow(int rows, const float* x, Pair* to) {
 }
 
 void dense(int inputs, int outputs, const Pair* packed, const Pair* x, Pair* y, const Pair* skip) {
-  if (skip) return Layer(inputs, outputs, packed, x, AddRelu{y, skip});
-  Layer(inputs, outputs, packed, x, Relu{y});
+  const Relu relu{y};
+  if (skip) return Layer(inputs, outputs, packed, x, WithSkip<Relu>{relu, skip});
+  Layer(inputs, outputs, packed, x, relu);
 }
 
 void dense_out(int inputs, int outputs, const Pair* packed, const Pair* x, float* y, bool accumulate) {
@@ -339,7 +334,7 @@ void narrow_gradient(int rows, const float* g, Gradient to) {
 void dense_back(int inputs, int outputs, const Pair* packed, const Pair* g, const Pair* skip, const Pair* act,
                 Gradient to) {
   const Gate gate{to, act};
-  if (skip) return Layer(inputs, outputs, packed, g, AddGate{gate, skip});
+  if (skip) return Layer(inputs, outputs, packed, g, WithSkip<Gate>{gate, skip});
   Layer(inputs, outputs, packed, g, gate);
 }
 
