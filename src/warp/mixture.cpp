@@ -11,12 +11,6 @@
 #include "warpath/error.h"
 
 namespace warpath {
-namespace {
-
-constexpr std::size_t kMaxComponents = 64;
-
-}  // namespace
-
 Mixture::Mixture(const std::vector<Component>& components) {
   double sum = 0;
   for (const Component& component : components) sum += component.weight;
@@ -39,51 +33,59 @@ Mixture::Mixture(const std::vector<Component>& components) {
 
 void Mixture::sample(Batch<const double> z, std::span<const double> u, Batch<double> y, std::span<double> log_q) const {
   const std::size_t rows = z.rows(), cols = z.cols();
-  // Rows sorted by the component that draws them: order[first[k]] ... order[first[k + 1] - 1] are those of k.
-  const Scratch<std::uint32_t> order(rows);
   const Scratch<std::uint8_t> chosen(rows);
-  std::array<std::size_t, kMaxComponents + 1> first{}, next{};
+  Starts first{};
   for (std::size_t i = 0; i < rows; ++i) {
     const auto k = static_cast<std::size_t>(std::upper_bound(m_end.begin(), m_end.end() - 1, u[i]) - m_end.begin());
     chosen[i] = static_cast<std::uint8_t>(k);
     ++first[k + 1];
   }
   for (std::size_t k = 0; k < m_components.size(); ++k) first[k + 1] += first[k];
-  next = first;
-  for (std::size_t i = 0; i < rows; ++i) order[next[chosen[i]]++] = static_cast<std::uint32_t>(i);
 
-  // Each component draws its rows, packed; then each tells its density of the rows that the others drew.
-  const Scratch<double> packed_z(rows * cols), packed_y(rows * cols), packed_u(rows), packed_q(rows);
-  const Scratch<double> others_y(rows * cols), others_q(rows);
-  for (std::size_t k = 0; k < m_components.size(); ++k) {
-    const double begin = k == 0 ? 0 : m_end[k - 1], width = m_end[k] - begin;
-    for (std::size_t j = first[k]; j < first[k + 1]; ++j) {
-      std::copy_n(&z(order[j], 0), cols, &packed_z[j * cols]);
-      packed_u[j] = std::min((u[order[j]] - begin) / width, 1 - 0x1p-53);  // uniform again
-    }
-    const std::size_t count = first[k + 1] - first[k];
-    if (count == 0) continue;
-    m_components[k].proposal->sample({&packed_z[first[k] * cols], count, cols}, {&packed_u[first[k]], count},
-                                     {&packed_y[first[k] * cols], count, cols}, {&packed_q[first[k]], count});
-    const double log_weight = std::log(m_components[k].weight);
-    for (std::size_t j = first[k]; j < first[k + 1]; ++j) packed_q[j] += log_weight;
+  // Rows sorted by the component that draws them: order[first[k]] ... order[first[k + 1] - 1] are those of k.
+  const Scratch<std::uint32_t> order(rows);
+  const Scratch<double> u_of_component(rows);
+  Starts next = first;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const std::size_t k = chosen[i], j = next[k]++;
+    const double begin = k == 0 ? 0 : m_end[k - 1];
+    order[j] = static_cast<std::uint32_t>(i);
+    u_of_component[j] = std::min((u[i] - begin) / (m_end[k] - begin), 1 - 0x1p-53);  // uniform again
   }
-  if (m_components.size() > 1) {
-    for (std::size_t k = 0; k < m_components.size(); ++k) {
-      const std::size_t count = rows - (first[k + 1] - first[k]);
-      if (count == 0) continue;
-      // Those before the component's own, and those behind.
-      std::copy_n(packed_y.data(), first[k] * cols, others_y.data());
-      std::copy_n(packed_y.data() + first[k + 1] * cols, (rows - first[k + 1]) * cols, &others_y[first[k] * cols]);
-      m_components[k].proposal->log_density({others_y.data(), count, cols}, {others_q.data(), count});
-      const double log_weight = std::log(m_components[k].weight);
-      log_add(first[k], packed_q.data(), others_q.data(), log_weight);
-      log_add(count - first[k], &packed_q[first[k + 1]], &others_q[first[k]], log_weight);
-    }
-  }
+  const std::span<const double> inner_u{u_of_component.data(), rows};
+  // As they come if u is stratified over the batch.
+  if (std::is_sorted(chosen.data(), chosen.data() + rows)) return sample_runs(first, z, inner_u, y, log_q);
+
+  const Scratch<double> packed_y(rows * cols), packed_q(rows);
+  const Batch<double> packed(packed_y.data(), rows, cols);
+  for (std::size_t j = 0; j < rows; ++j) std::copy_n(&z(order[j], 0), cols, &packed(j, 0));
+  sample_runs(first, packed, inner_u, packed, {packed_q.data(), rows});
   for (std::size_t j = 0; j < rows; ++j) {
-    std::copy_n(&packed_y[j * cols], cols, &y(order[j], 0));
+    std::copy_n(&packed(j, 0), cols, &y(order[j], 0));
     log_q[order[j]] = packed_q[j];
+  }
+}
+
+void Mixture::sample_runs(const Starts& first, Batch<const double> z, std::span<const double> u, Batch<double> y,
+                          std::span<double> log_q) const {
+  for (std::size_t k = 0; k < m_components.size(); ++k) {
+    const std::size_t begin = first[k], count = first[k + 1] - begin;
+    if (count == 0) continue;
+    const std::span<double> own_q = log_q.subspan(begin, count);
+    m_components[k].proposal->sample(z.rows_from(begin, count), u.subspan(begin, count), y.rows_from(begin, count),
+                                     own_q);
+    const double log_weight = std::log(m_components[k].weight);
+    for (double& value : own_q) value += log_weight;
+  }
+  const Scratch<double> other_q(z.rows());
+  for (std::size_t k = 0; k < m_components.size(); ++k) {
+    const auto add_density = [&](std::size_t begin, std::size_t end) {
+      if (begin == end) return;
+      m_components[k].proposal->log_density(y.rows_from(begin, end - begin), {other_q.data(), end - begin});
+      log_add(end - begin, &log_q[begin], other_q.data(), std::log(m_components[k].weight));
+    };
+    add_density(0, first[k]);
+    add_density(first[k + 1], z.rows());
   }
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <vector>
 
 #include "warpath/warp.h"
@@ -27,6 +28,12 @@ class Mixture : public Proposal {
   static std::shared_ptr<const Mixture> load(const TensorFile& file, const std::string& prefix);
 
  private:
+  static constexpr std::size_t kMaxComponents = 64;
+  using Starts = std::array<std::size_t, kMaxComponents + 1>;
+  /// Rows [first[k], first[k + 1]) are drawn by component k; then each tells its density of those that others drew.
+  void sample_runs(const Starts& first, Batch<const double> z, std::span<const double> u, Batch<double> y,
+                   std::span<double> log_q) const;
+
   std::vector<Component> m_components;
   std::vector<double> m_end;  ///< component k is chosen by u in [m_end[k-1], m_end[k])
 };
