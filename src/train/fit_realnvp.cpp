@@ -49,8 +49,7 @@ Floats start_from(const Proposal& init, const realnvp::Flow& flow) {
 void initialise_norms(const realnvp::Flow& flow, const ExampleBlocks& batch, Floats& parameters) {
   const std::size_t blocks = batch.count;
   Floats v(blocks * batch.dims * kBlock);
-  for (std::size_t i = 0; i < blocks * batch.dims; ++i)
-    realnvp::logit(batch.y.data() + i * kBlock, v.data() + i * kBlock);
+  realnvp::logit(static_cast<int>(blocks * batch.dims), batch.y.data(), v.data());
   parallel(flow.couplings().size(), [&](std::size_t c) {
     const realnvp::Coupling& coupling = flow.couplings()[c];
     const std::size_t inputs = static_cast<std::size_t>(coupling.nets[0].inputs());

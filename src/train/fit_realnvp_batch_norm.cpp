@@ -221,10 +221,8 @@ double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const FlowO
   };
 
   parallel(blocks, [&](std::size_t b) {
-    for (std::size_t i = 0; i < dims; ++i) {
-      logit(batch.block_y(b) + i * kBlock, row(at(couplings, b), i));
-      add_log_logistic(row(at(couplings, b), i), true, log_q.data() + b * kBlock);
-    }
+    logit(flow.dims(), batch.block_y(b), at(couplings, b));
+    add_log_logistic(flow.dims(), at(couplings, b), true, log_q.data() + b * kBlock);
   });
   for (std::size_t c = couplings; c-- > 0;) {
     const Coupling& coupling = flow.couplings()[c];
@@ -232,17 +230,15 @@ double batch_norm_step(const Flow& flow, const ExampleBlocks& batch, const FlowO
     parallel(blocks, [&](std::size_t b) {
       float* h = heads.data() + b * head_rows;
       std::copy_n(at(c + 1, b), state, at(c, b));
-      for (std::size_t k = 0; k < coupling.moved.size(); ++k)
-        uncouple(parameters[coupling.scales + k], row(h, k), row(h, coupling.moved.size() + k),
-                 row(at(c, b), static_cast<std::size_t>(coupling.moved[k])), log_q.data() + b * kBlock);
+      uncouple(coupling.moved, &parameters[coupling.scales], h, at(c, b), log_q.data() + b * kBlock);
     });
   }
   std::vector<double> loss(blocks);
   parallel(blocks, [&](std::size_t b) {
     float* w = weight.data() + b * kBlock;
-    for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(at(0, b), i), false, log_q.data() + b * kBlock);
+    add_log_logistic(flow.dims(), at(0, b), false, log_q.data() + b * kBlock);
     loss[b] = block_loss(objective, log_q.data() + b * kBlock, batch.block_weight(b), batch.block_target(b), w);
-    for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(w, row(at(0, b), i), row(d_v.data() + b * state, i));
+    log_logistic_gradient(flow.dims(), w, at(0, b), d_v.data() + b * state);
   });
 
   for (std::size_t c = 0; c < couplings; ++c) {

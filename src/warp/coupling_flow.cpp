@@ -34,17 +34,21 @@ void run_flow(const CouplingFlow& flow, const PackedParameters& packed, bool for
   float* const rest = reinterpret_cast<float*>(sums + kBlock);
   for (std::size_t first = 0; first < from.rows(); first += kBlock) {
     const std::size_t rows = std::min<std::size_t>(kBlock, from.rows() - first);
-    for (std::size_t i = 0; i < dims; ++i) {
-      for (std::size_t r = 0; r < rows; ++r) block[i * kBlock + r] = from(first + r, i);
-      std::fill(block + i * kBlock + rows, block + (i + 1) * kBlock, 0.5);  // the last block is filled up
+    for (std::size_t r = 0; r < rows; ++r) {
+      const double* row = &from(first + r, 0);
+      for (std::size_t i = 0; i < dims; ++i) block[i * kBlock + r] = row[i];
     }
+    if (rows < kBlock)  // the last block is filled up
+      for (std::size_t i = 0; i < dims; ++i) std::fill(block + i * kBlock + rows, block + (i + 1) * kBlock, 0.5);
     if (forward) {
       flow.forward(packed, block, block, sums, rest);
     } else {
       flow.inverse(packed, block, block, sums, rest);
     }
-    for (std::size_t i = 0; i < dims; ++i)
-      for (std::size_t r = 0; r < rows; ++r) to(first + r, i) = block[i * kBlock + r];
+    for (std::size_t r = 0; r < rows; ++r) {
+      double* row = &to(first + r, 0);
+      for (std::size_t i = 0; i < dims; ++i) row[i] = block[i * kBlock + r];
+    }
     std::copy_n(sums, rows, log_det.data() + first);
   }
 }

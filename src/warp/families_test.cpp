@@ -244,6 +244,28 @@ TEST(Mixture, IsFlatAndNormalised) {
   EXPECT_EQ(check_proposal(outer), "");
 }
 
+// Stratified u come in the order of the components, and then nothing is copied.
+TEST(Mixture, RowsMayComeInAnyOrder) {
+  const auto mixture = mixture_of_all(3);
+  constexpr std::size_t kRows = 1000, kStep = 333;  // without a common factor
+  Matrix<double> z(kRows, 3), y(kRows, 3), shuffled_z(kRows, 3), shuffled_y(kRows, 3);
+  std::vector<double> u(kRows), log_q(kRows), shuffled_u(kRows), shuffled_log_q(kRows);
+  for (std::size_t i = 0; i < z.values().size(); ++i) z.values()[i] = random(9, i);
+  for (std::size_t i = 0; i < kRows; ++i) {
+    u[i] = (static_cast<double>(i) + random(10, i)) / kRows;
+    const std::size_t to = i * kStep % kRows;
+    std::copy_n(&z(i, 0), 3, &shuffled_z(to, 0));
+    shuffled_u[to] = u[i];
+  }
+  mixture->sample(z.batch(), u, y.batch(), log_q);
+  mixture->sample(shuffled_z.batch(), shuffled_u, shuffled_y.batch(), shuffled_log_q);
+  for (std::size_t i = 0; i < kRows; ++i) {
+    const std::size_t to = i * kStep % kRows;
+    for (std::size_t d = 0; d < 3; ++d) EXPECT_EQ(y(i, d), shuffled_y(to, d)) << i;
+    EXPECT_EQ(log_q[i], shuffled_log_q[to]) << i;
+  }
+}
+
 TEST(Mixture, BoundsTheWeights) {
   const Mixture mixture({{random_tree(2, 1000), 0.9}, {std::make_shared<Uniform>(2), 0.1}});
   Matrix<double> y(1000, 2);

@@ -175,17 +175,15 @@ void Flow::forward(const PackedParameters& packed, const double* z, double* y, d
   float* x = row(v, m_dims);
   float* heads = row(x, m_most_inputs);
   float* rest = row(heads, 2 * m_most_moved);
-  for (int i = 0; i < m_dims; ++i) logit(z + i * kBlock, row(start, i));
+  logit(m_dims, z, start);
   std::copy_n(start, m_dims * kBlock, v);
   std::fill_n(log_det, kBlock, 0.0);
   for (std::size_t c = 0; c < m_couplings.size(); ++c) {
     const Coupling& coupling = m_couplings[c];
     condition(coupling, packed, v, x, rest, heads);
-    for (std::size_t k = 0; k < coupling.moved.size(); ++k)
-      couple(packed.scales[c * m_most_moved + k], row(heads, k), row(heads, coupling.moved.size() + k),
-             row(v, coupling.moved[k]), log_det);
+    couple(coupling.moved, &packed.scales[c * m_most_moved], heads, v, log_det);
   }
-  for (int i = 0; i < m_dims; ++i) shift_logit(z + i * kBlock, row(start, i), row(v, i), y + i * kBlock, log_det);
+  shift_logit(m_dims, z, start, v, y, log_det);
 }
 
 void Flow::inverse(const PackedParameters& packed, const double* y, double* z, double* log_det, float* scratch) const {
@@ -194,17 +192,15 @@ void Flow::inverse(const PackedParameters& packed, const double* y, double* z, d
   float* x = row(v, m_dims);
   float* heads = row(x, m_most_inputs);
   float* rest = row(heads, 2 * m_most_moved);
-  for (int i = 0; i < m_dims; ++i) logit(y + i * kBlock, row(start, i));
+  logit(m_dims, y, start);
   std::copy_n(start, m_dims * kBlock, v);
   std::fill_n(log_det, kBlock, 0.0);
   for (std::size_t c = m_couplings.size(); c-- > 0;) {
     const Coupling& coupling = m_couplings[c];
     condition(coupling, packed, v, x, rest, heads);
-    for (std::size_t k = 0; k < coupling.moved.size(); ++k)
-      uncouple(packed.scales[c * m_most_moved + k], row(heads, k), row(heads, coupling.moved.size() + k),
-               row(v, coupling.moved[k]), log_det);
+    uncouple(coupling.moved, &packed.scales[c * m_most_moved], heads, v, log_det);
   }
-  for (int i = 0; i < m_dims; ++i) shift_logit(y + i * kBlock, row(start, i), row(v, i), z + i * kBlock, log_det);
+  shift_logit(m_dims, y, start, v, z, log_det);
 }
 
 // Training: v before each coupling and at the end, every coupling's heads and activations; then gradients of heads, v
@@ -233,10 +229,8 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
   // y -> z, keeping everything. v + c dims: the numbers above coupling c, v itself: those of z.
   float* now = v + couplings * dims * kBlock;
   std::fill_n(log_q, kBlock, 0.0);
-  for (std::size_t i = 0; i < dims; ++i) {
-    logit(y + i * kBlock, row(now, i));
-    add_log_logistic(row(now, i), true, log_q);
-  }
+  logit(m_dims, y, now);
+  add_log_logistic(m_dims, now, true, log_q);
   for (std::size_t c = couplings; c-- > 0; now -= dims * kBlock) {
     const Coupling& coupling = m_couplings[c];
     const std::size_t moved = coupling.moved.size();
@@ -250,13 +244,12 @@ double Flow::train_block(const PackedParameters& packed, const double* y, const 
       coupling.nets[n].forward(packed.forward.data() + coupling.packed[n], activations + coupling.activations[n],
                                row(h, n * moved));
     std::copy_n(now, dims * kBlock, next);
-    for (std::size_t k = 0; k < moved; ++k)
-      uncouple(packed.scales[c * m_most_moved + k], row(h, k), row(h, moved + k), row(next, coupling.moved[k]), log_q);
+    uncouple(coupling.moved, &packed.scales[c * m_most_moved], h, next, log_q);
   }
-  for (std::size_t i = 0; i < dims; ++i) add_log_logistic(row(v, i), false, log_q);
+  add_log_logistic(m_dims, v, false, log_q);
 
   const double loss = block_loss(objective, log_q, weight, target, sample_weight);
-  for (std::size_t i = 0; i < dims; ++i) log_logistic_gradient(sample_weight, row(v, i), row(d_v, i));
+  log_logistic_gradient(m_dims, sample_weight, v, d_v);
   now = v + dims * kBlock;
   for (std::size_t c = 0; c < couplings; ++c, now += dims * kBlock) {
     const Coupling& coupling = m_couplings[c];

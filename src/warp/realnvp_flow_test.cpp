@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/rng.h"
+#include "warp/realnvp_kernels.h"
 #include "warp/realnvp_reference.h"
 #include "warpath/error.h"
 
@@ -184,6 +185,37 @@ TEST_P(FlowTest, GradientsAgreeWithFiniteDifferences) {
           << view.name << "(" << r << ", " << c << ")";
     }
   EXPECT_LT(skipped, checked / 4) << "too many kinks for a test";
+}
+
+// Far beyond what a flow does, and where it must do nothing.
+TEST(Kernels, ShiftLogitFollowsItsFormula) {
+  for (const std::string& target : nn::simd_targets()) {
+    const nn::ForceSimdTarget force(target);
+    constexpr int kRows = 32;
+    Doubles z(kRows * kBlock), y(kRows * kBlock), log_det(kBlock, 0.5);
+    Floats v0(z.size()), v1(z.size());
+    for (std::size_t i = 0; i < z.size(); ++i) {
+      z[i] = i % 13 == 0 ? 0.0 : sample_double(4, static_cast<std::uint32_t>(i));
+      v0[i] = 4 * sample_float(5, static_cast<std::uint32_t>(i)) - 2;
+      const bool still = i % kBlock < 8;
+      v1[i] = still ? v0[i] : v0[i] + 600 * sample_float(6, static_cast<std::uint32_t>(i)) - 300;
+    }
+    shift_logit(kRows, z.data(), v0.data(), v1.data(), y.data(), log_det.data());
+    for (std::size_t s = 0; s < kBlock; ++s) {
+      double exact = 0.5;
+      for (std::size_t i = s; i < z.size(); i += kBlock) {
+        const double back = std::clamp(static_cast<double>(v0[i]) - static_cast<double>(v1[i]), -300.0, 300.0);
+        const double sum = z[i] + (1 - z[i]) * std::exp(back);
+        EXPECT_NEAR(y[i], z[i] / sum, 1e-6 * z[i] / sum) << i;
+        EXPECT_LT(y[i], 1) << i;
+        if (s < 8) {
+          EXPECT_EQ(y[i], z[i]) << i;
+        }
+        exact += back - 2 * std::log(sum);
+      }
+      EXPECT_NEAR(log_det[s], exact, s < 8 ? 0 : 1e-5) << s;
+    }
+  }
 }
 
 // Which dimensions each coupling keeps, as digits.

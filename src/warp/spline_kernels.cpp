@@ -7,6 +7,8 @@
 // After highway.h, which it needs.
 #include <hwy/contrib/math/math-inl.h>
 
+#include "warp/exp2-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace warpath::spline::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -30,19 +32,7 @@ constexpr float kLn2 = 0.693147181f;
 
 HWY_INLINE VD LoadDoubles(const float* p) { return hn::PromoteTo(dd, hn::Load(df, p)); }
 
-/// 2^x for -126 <= x <= 126, by Taylor's polynomial of 2^f, |f| <= 1/2: relative error 2e-7.
-HWY_INLINE V Exp2(V x) {
-  const V whole = hn::Round(x), f = hn::Sub(x, whole);
-  V p = hn::Set(d, 1.54035304e-4f);
-  p = hn::MulAdd(p, f, hn::Set(d, 1.33335581e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 9.61812911e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 5.55041087e-2f));
-  p = hn::MulAdd(p, f, hn::Set(d, 2.40226507e-1f));
-  p = hn::MulAdd(p, f, hn::Set(d, kLn2));
-  p = hn::MulAdd(p, f, hn::Set(d, 1.0f));
-  // Times 2^whole: added to the exponent.
-  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::ConvertTo(di, whole))));
-}
+HWY_INLINE V Exp2(V x) { return warpath::HWY_NAMESPACE::Exp2(d, x); }
 
 /// Widths or heights of the bins of some samples: each is least + slope * e[j], and all add up to 1.
 struct Softmax {
