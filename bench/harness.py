@@ -119,9 +119,11 @@ class Bench:
         return path
 
     def counters(self, name, benchmarks=".*"):
-        """Results of a Google Benchmark binary by name: of each the fastest of three, as the machine may have other work."""
+        """Results of a Google Benchmark binary by name: of each the fastest of nine, as the machine may have other work, which
+        comes in bursts: the repetitions of all are run in a random order."""
         with tempfile.NamedTemporaryFile(suffix=".json") as out:
-            command = [self.binary(name), f"--benchmark_filter={benchmarks}", f"--benchmark_out={out.name}", "--benchmark_repetitions=3"]
+            command = [self.binary(name), f"--benchmark_filter={benchmarks}", f"--benchmark_out={out.name}", "--benchmark_min_time=0.15",
+                       "--benchmark_repetitions=9", "--benchmark_enable_random_interleaving=true"]
             subprocess.run(command, check=True, capture_output=True)
             runs = [b for b in json.load(open(out.name))["benchmarks"] if b["run_type"] == "iteration"]
             return {b["name"]: b for b in sorted(runs, key=lambda b: -b["cpu_time"])}
