@@ -52,7 +52,10 @@ class Row:
         return None if self.value is None or self.bound is None else self.bound.holds(self.value)
 
     def shown(self):
-        return "–" if self.value is None else f"{self.value:.3g} {self.unit}".strip()
+        if self.value is None:
+            return "–"
+        number = f"{self.value:.0f}" if abs(self.value) >= 1000 else f"{self.value:.3g}"
+        return f"{number} {self.unit}".strip()
 
     def as_dict(self):
         return {**vars(self), "bound": str(self.bound) if self.bound else None, "holds": self.holds()}
