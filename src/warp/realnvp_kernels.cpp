@@ -146,44 +146,52 @@ HWY_INLINE void AddDoubles(double unit, const float* HWY_RESTRICT terms, double*
   }
 }
 
-void Couple(int moved, const int* HWY_RESTRICT rows, const float* HWY_RESTRICT a, const float* HWY_RESTRICT heads,
-            float* HWY_RESTRICT v, double* HWY_RESTRICT log_det) {
-  HWY_ALIGN float terms[kBlock] = {};
-  const V edge = hn::Set(d, kEdge), one = hn::Set(d, 1.0f);
+struct Moved {
+  V to;
+  hn::Mask<D> inside;  // where it is scaled
+};
+struct Forward {
+  HWY_INLINE Moved operator()(V x, V e, V t) const {
+    const V edge = hn::Set(d, kEdge);
+    const auto inside = hn::Le(hn::Abs(x), edge);
+    const V beyond = hn::MulAdd(hn::CopySign(edge, x), hn::Sub(e, hn::Set(d, 1.0f)), hn::Add(x, t));
+    return {hn::IfThenElse(inside, hn::MulAdd(x, e, t), beyond), inside};
+  }
+};
+struct Backward {
+  HWY_INLINE Moved operator()(V v, V e, V t) const {
+    const V edge = hn::Set(d, kEdge), x = hn::Sub(v, t);
+    const auto inside = hn::Le(hn::Abs(x), hn::Mul(edge, e));
+    const V beyond = hn::NegMulAdd(hn::CopySign(edge, x), hn::Sub(e, hn::Set(d, 1.0f)), x);
+    return {hn::IfThenElse(inside, hn::Div(x, e), beyond), inside};
+  }
+};
+
+/// log_det += sign * s of all rows.
+template <class Direction>
+HWY_INLINE void MoveRows(Direction direction, double sign, int moved, const int* HWY_RESTRICT rows,
+                         const float* HWY_RESTRICT a, const float* HWY_RESTRICT heads, float* HWY_RESTRICT v,
+                         double* HWY_RESTRICT log_det) {
+  HWY_ALIGN float octaves[kBlock] = {};
   const float* HWY_RESTRICT h_t = heads + moved * kBlock;
   for (int k = 0; k < moved; ++k, heads += kBlock, h_t += kBlock) {
     const V scale = Octaves(a[k]);
     float* HWY_RESTRICT row = v + rows[k] * kBlock;
     for (int i = 0; i < kBlock; i += kLanes) {
       const V s = hn::Mul(scale, Tanh(hn::Load(d, heads + i)));
-      const V e = Exp2(d, s), t = hn::Load(d, h_t + i), x = hn::Load(d, row + i);
-      const auto inside = hn::Le(hn::Abs(x), edge);
-      const V beyond = hn::MulAdd(hn::CopySign(edge, x), hn::Sub(e, one), hn::Add(x, t));
-      hn::Store(hn::IfThenElse(inside, hn::MulAdd(x, e, t), beyond), d, row + i);
-      hn::Store(hn::Add(hn::Load(d, terms + i), hn::IfThenElseZero(inside, s)), d, terms + i);
+      const Moved now = direction(hn::Load(d, row + i), Exp2(d, s), hn::Load(d, h_t + i));
+      hn::Store(now.to, d, row + i);
+      hn::Store(hn::Add(hn::Load(d, octaves + i), hn::IfThenElseZero(now.inside, s)), d, octaves + i);
     }
   }
-  AddDoubles(kLn2, terms, log_det);
+  AddDoubles(sign * kLn2, octaves, log_det);
 }
 
-void Uncouple(int moved, const int* HWY_RESTRICT rows, const float* HWY_RESTRICT a, const float* HWY_RESTRICT heads,
-              float* HWY_RESTRICT v, double* HWY_RESTRICT log_det) {
-  HWY_ALIGN float terms[kBlock] = {};
-  const V edge = hn::Set(d, kEdge), one = hn::Set(d, 1.0f);
-  const float* HWY_RESTRICT h_t = heads + moved * kBlock;
-  for (int k = 0; k < moved; ++k, heads += kBlock, h_t += kBlock) {
-    const V scale = Octaves(a[k]);
-    float* HWY_RESTRICT row = v + rows[k] * kBlock;
-    for (int i = 0; i < kBlock; i += kLanes) {
-      const V s = hn::Mul(scale, Tanh(hn::Load(d, heads + i)));
-      const V e = Exp2(d, s), x = hn::Sub(hn::Load(d, row + i), hn::Load(d, h_t + i));
-      const auto inside = hn::Le(hn::Abs(x), hn::Mul(edge, e));
-      const V beyond = hn::NegMulAdd(hn::CopySign(edge, x), hn::Sub(e, one), x);
-      hn::Store(hn::IfThenElse(inside, hn::Div(x, e), beyond), d, row + i);
-      hn::Store(hn::Add(hn::Load(d, terms + i), hn::IfThenElseZero(inside, s)), d, terms + i);
-    }
-  }
-  AddDoubles(-kLn2, terms, log_det);
+void Couple(int moved, const int* rows, const float* a, const float* heads, float* v, double* log_det) {
+  MoveRows(Forward{}, 1, moved, rows, a, heads, v, log_det);
+}
+void Uncouple(int moved, const int* rows, const float* a, const float* heads, float* v, double* log_det) {
+  MoveRows(Backward{}, -1, moved, rows, a, heads, v, log_det);
 }
 
 float UncoupleBackward(float a, const float* HWY_RESTRICT h_s, const float* HWY_RESTRICT h_t,
