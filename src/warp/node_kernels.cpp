@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "warpath/error.h"
 
@@ -10,8 +9,8 @@
 #define HWY_TARGET_INCLUDE "warp/node_kernels.cpp"  // compiled once for each instruction set
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-// After highway.h, which it needs.
-#include <hwy/contrib/math/math-inl.h>
+
+#include "warp/exp2-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace warpath::HWY_NAMESPACE {
@@ -59,6 +58,17 @@ HWY_INLINE Children PrefixSums(Children c) {
   return c;
 }
 
+/// Vector k of 16 bytes.
+template <class Bytes>
+HWY_INLINE hn::Vec<decltype(di)> Widen(Bytes bytes, int k) {
+  if constexpr (kVectors == 1) {
+    return hn::PromoteTo(di, bytes);
+  } else {
+    const hn::Rebind<std::uint8_t, D> half;
+    return hn::PromoteTo(di, k == 0 ? hn::LowerHalf(half, bytes) : hn::UpperHalf(half, bytes));
+  }
+}
+
 /// The prior of a node's children, and its sums up to and with each.
 struct Prior {
   Children own, reached;
@@ -69,14 +79,12 @@ struct Prior {
       reached = Children::Load(tree.reached() + node * kChildren);
       return;
     }
-    alignas(16) std::uint8_t cumulative[32];
-    cumulative[15] = 0;
-    std::memcpy(cumulative + 16, field + node * kChildren, kChildren);
-    const hn::Rebind<std::uint8_t, D> bytes;
+    // In registers: a load that crosses two stores has to wait for both.
+    const hn::CappedTag<std::uint8_t, 16> bytes;
+    const auto ends = hn::LoadU(bytes, field + node * kChildren), begins = hn::ShiftLeftBytes<1>(ends);
     const V unit = hn::Set(d, 1.0f / kWholeProbability);
     for (int k = 0; k < kVectors; ++k) {
-      const auto end = hn::PromoteTo(di, hn::LoadU(bytes, cumulative + 16 + k * kLanes));
-      const auto begin = hn::PromoteTo(di, hn::LoadU(bytes, cumulative + 15 + k * kLanes));
+      const auto end = Widen(ends, k), begin = Widen(begins, k);
       own.v[k] = hn::Mul(hn::ConvertTo(d, hn::Sub(end, begin)), unit);
       reached.v[k] = hn::Mul(hn::ConvertTo(d, end), unit);
     }
@@ -112,9 +120,12 @@ struct Node {
   float over_sum;
 
   HWY_INLINE Node(const Children& logits, const Prior& prior) {
-    const V most = hn::Set(d, 30.0f);  // far from overflow; and no child vanishes
-    for (int k = 0; k < kVectors; ++k)
-      e.v[k] = hn::Mul(prior.own.v[k], hn::Exp(d, hn::Max(hn::Min(logits.v[k], most), hn::Neg(most))));
+    const V log2_e = hn::Set(d, 1.44269504f);
+    const V most = hn::Set(d, 40.0f);  // far from overflow; and no child vanishes
+    for (int k = 0; k < kVectors; ++k) {
+      const V octaves = hn::Max(hn::Min(hn::Mul(logits.v[k], log2_e), most), hn::Neg(most));
+      e.v[k] = hn::Mul(prior.own.v[k], Exp2(d, octaves));
+    }
     reached = PrefixSums(e);
     HWY_ALIGN float last[kLanes];
     hn::Store(reached.v[kVectors - 1], d, last);
