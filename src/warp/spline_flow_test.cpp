@@ -190,8 +190,7 @@ TEST_P(SplineFlowTest, GradientsAgreeWithFiniteDifferences) {
         continue;
       }
       ++checked;
-      // The weights are wild, so that the rounding of floats comes to 2.6e-3.
-      EXPECT_NEAR(static_cast<double>(gradients[at]) * objective.scale, wide, 4e-3 * (1 + std::abs(wide)))
+      EXPECT_NEAR(static_cast<double>(gradients[at]) * objective.scale, wide, 2e-3 * (1 + std::abs(wide)))
           << view.name << "(" << r << ", " << c << ")";
     }
   EXPECT_LT(skipped, checked / 4) << "too many kinks for a test";
