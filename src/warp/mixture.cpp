@@ -1,7 +1,6 @@
 #include "warp/mixture.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +10,7 @@
 #include "warpath/error.h"
 
 namespace warpath {
+
 Mixture::Mixture(const std::vector<Component>& components) {
   double sum = 0;
   for (const Component& component : components) sum += component.weight;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "warpath/error.h"
 
@@ -120,7 +121,7 @@ struct Node {
   float over_sum;
 
   HWY_INLINE Node(const Children& logits, const Prior& prior) {
-    const V log2_e = hn::Set(d, 1.44269504f);
+    const V log2_e = hn::Set(d, std::numbers::log2e_v<float>);
     const V most = hn::Set(d, 40.0f);  // far from overflow; and no child vanishes
     for (int k = 0; k < kVectors; ++k) {
       const V octaves = hn::Max(hn::Min(hn::Mul(logits.v[k], log2_e), most), hn::Neg(most));

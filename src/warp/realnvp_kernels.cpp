@@ -1,5 +1,7 @@
 #include "warp/realnvp_kernels.h"
 
+#include <numbers>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "warp/realnvp_kernels.cpp"  // compiled once for each instruction set
 #include <hwy/foreach_target.h>
@@ -29,8 +31,6 @@ using warpath::HWY_NAMESPACE::Exp2;
 using warpath::HWY_NAMESPACE::Exp2OfFraction;
 
 constexpr double kBelowOne = 0x1.fffffffffffffp-1;
-constexpr double kLog2E = 1.44269504088896341;
-constexpr double kLn2 = 0.693147180559945309;
 
 void Logit(int rows, const double* HWY_RESTRICT z, float* HWY_RESTRICT v) {
   const auto one = hn::Set(dd, 1.0), tiny = hn::Set(dd, 1.3e-37), huge = hn::Set(dd, 0.8e37);
@@ -44,7 +44,7 @@ void Logit(int rows, const double* HWY_RESTRICT z, float* HWY_RESTRICT v) {
 
 /// e^x for |x| <= 300, with the error of a float, which is that of x here.
 HWY_INLINE VD Exp(VD x) {
-  const VD log2_e = hn::Set(dd, kLog2E);
+  const VD log2_e = hn::Set(dd, std::numbers::log2e);
   // So large that its last bits are the whole part of x log2(e).
   const VD magic = hn::Set(dd, 0x1.8p52), shifted = hn::MulAdd(x, log2_e, magic);
   const VD fraction = hn::MulSub(x, log2_e, hn::Sub(shifted, magic));
@@ -64,7 +64,7 @@ struct LogOfProduct {
   }
   HWY_INLINE VD Log() const {
     const VD powers = hn::ConvertTo(dd, hn::BitCast(hn::RebindToSigned<DD>(), exponent));
-    return hn::MulAdd(powers, hn::Set(dd, kLn2), hn::Log(dd, mantissa));
+    return hn::MulAdd(powers, hn::Set(dd, std::numbers::ln2), hn::Log(dd, mantissa));
   }
 };
 
@@ -96,12 +96,14 @@ HWY_INLINE V Sigmoid(V v) {
 /// Absolute error 1e-7, which is what counts here; highway's has that relative error and takes twice as long.
 HWY_INLINE V Tanh(V v) {
   const V one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), most = hn::Set(d, 30.0f);
-  const V log2_odds = hn::Mul(hn::Max(hn::Min(v, most), hn::Neg(most)), hn::Set(d, 2 * static_cast<float>(kLog2E)));
+  const V log2_odds = hn::Mul(hn::Max(hn::Min(v, most), hn::Neg(most)), hn::Set(d, 2 * std::numbers::log2e_v<float>));
   return hn::Sub(one, hn::Div(two, hn::Add(Exp2(d, log2_odds), one)));
 }
 
 /// The row's scale in octaves, so that slope and density are one number.
-HWY_INLINE V Octaves(float a) { return hn::Set(d, HWY_MAX(-126.0f, HWY_MIN(a * static_cast<float>(kLog2E), 126.0f))); }
+HWY_INLINE V Octaves(float a) {
+  return hn::Set(d, HWY_MAX(-126.0f, HWY_MIN(a * std::numbers::log2e_v<float>, 126.0f)));
+}
 
 void Encode(int bins, const float* HWY_RESTRICT v, float* HWY_RESTRICT x) {
   const V one = hn::Set(d, 1.0f), scale = hn::Set(d, 1 / kBlobRadius);
@@ -184,7 +186,7 @@ HWY_INLINE void MoveRows(Direction direction, double sign, int moved, const int*
       hn::Store(hn::Add(hn::Load(d, octaves + i), hn::IfThenElseZero(now.inside, s)), d, octaves + i);
     }
   }
-  AddDoubles(sign * kLn2, octaves, log_det);
+  AddDoubles(sign * std::numbers::ln2, octaves, log_det);
 }
 
 void Couple(int moved, const int* rows, const float* a, const float* heads, float* v, double* log_det) {

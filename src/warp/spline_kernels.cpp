@@ -1,5 +1,7 @@
 #include "warp/spline_kernels.h"
 
+#include <numbers>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "warp/spline_kernels.cpp"  // compiled once for each instruction set
 #include <hwy/foreach_target.h>
@@ -25,14 +27,12 @@ constexpr DD dd;
 constexpr hn::Rebind<float, DD> df;
 constexpr int kDoubles = hn::MaxLanes(DD());
 using nn::kBlock;
+using warpath::HWY_NAMESPACE::Exp2;
 
 constexpr float kBelowOneFloat = 0x1.fffffep-1f;
 constexpr double kBelowOne = 0x1.fffffffffffffp-1;
-constexpr float kLn2 = 0.693147181f;
 
 HWY_INLINE VD LoadDoubles(const float* p) { return hn::PromoteTo(dd, hn::Load(df, p)); }
-
-HWY_INLINE V Exp2(V x) { return warpath::HWY_NAMESPACE::Exp2(d, x); }
 
 /// Widths or heights of the bins of some samples: each is least + slope * e[j], and all add up to 1.
 struct Softmax {
@@ -46,7 +46,7 @@ struct Softmax {
     const V floor = hn::Set(d, -126.0f);
     V sum = hn::Zero(d);
     for (int j = 0; j < bins; ++j) {
-      e[j] = Exp2(hn::Max(hn::Sub(hn::Load(d, h + j * kBlock), most), floor));
+      e[j] = Exp2(d, hn::Max(hn::Sub(hn::Load(d, h + j * kBlock), most), floor));
       sum = hn::Add(sum, e[j]);
     }
     inverse_sum = hn::Div(hn::Set(d, 1.0f), sum);
@@ -106,8 +106,8 @@ struct BinRow {
       hn::Store(bin.y1, d, y1 + i);
       hn::Store(bin.z0, d, z0 + i);
       hn::Store(bin.z1, d, z1 + i);
-      hn::Store(Exp2(LogSlope(bin.h0)), d, d0 + i);
-      hn::Store(Exp2(LogSlope(bin.h1)), d, d1 + i);
+      hn::Store(Exp2(d, LogSlope(bin.h0)), d, d0 + i);
+      hn::Store(Exp2(d, LogSlope(bin.h1)), d, d1 + i);
     }
   }
 };
@@ -214,7 +214,7 @@ void SqueezeForTraining(int bins, const float* HWY_RESTRICT heads, const float* 
     heights.Compute(bins, heads + bins * kBlock + i);
     const Bin bin = Find<false>(bins, heads + i, x, widths, heights);
     const Rational s(d, hn::Sub(x, bin.y0), hn::Sub(bin.y1, x), hn::Sub(bin.y1, bin.y0), hn::Sub(bin.z1, bin.z0),
-                     Exp2(LogSlope(bin.h0)), Exp2(LogSlope(bin.h1)));
+                     Exp2(d, LogSlope(bin.h0)), Exp2(d, LogSlope(bin.h1)));
     hn::Store(hn::Min(hn::Add(bin.z0, s.Rise()), hn::Set(d, kBelowOneFloat)), d, z + i);
     hn::Store(hn::Log(d, s.Slope()), d, terms + i);
   }
@@ -226,7 +226,7 @@ void SqueezeForTraining(int bins, const float* HWY_RESTRICT heads, const float* 
 HWY_INLINE V SlopeBackward(V h, V slope) {
   const V one = hn::Set(d, 1.0f);
   const V bound = hn::MulAdd(hn::Abs(h), hn::Set(d, 1 / kMostSlope), one);
-  return hn::Div(hn::Mul(slope, hn::Set(d, kLn2)), hn::Mul(bound, bound));
+  return hn::Div(hn::Mul(slope, hn::Set(d, std::numbers::ln2_v<float>)), hn::Mul(bound, bound));
 }
 
 /// The loss's derivatives with respect to a bin: where it starts, its width and height, and S' at its ends (as outputs
@@ -258,7 +258,8 @@ HWY_INLINE void BinBackward(int bins, const Softmax& widths, const Softmax& heig
     above = beyond;
   }
   hn::Store(slope, d, d_slopes + bins * kBlock);
-  const V scale_w = hn::Mul(widths.slope, hn::Set(d, kLn2)), scale_h = hn::Mul(heights.slope, hn::Set(d, kLn2));
+  const V scale_w = hn::Mul(widths.slope, hn::Set(d, std::numbers::ln2_v<float>)),
+          scale_h = hn::Mul(heights.slope, hn::Set(d, std::numbers::ln2_v<float>));
   mean_w = hn::Mul(mean_w, widths.inverse_sum);
   mean_h = hn::Mul(mean_h, heights.inverse_sum);
   for (int j = 0; j < bins; ++j) {
@@ -276,7 +277,7 @@ void SqueezeBackward(int bins, const float* HWY_RESTRICT heads, const float* HWY
     widths.Compute(bins, heads + i);
     heights.Compute(bins, heads + bins * kBlock + i);
     const Bin bin = Find<false>(bins, heads + i, x, widths, heights);
-    const V d0 = Exp2(LogSlope(bin.h0)), d1 = Exp2(LogSlope(bin.h1));
+    const V d0 = Exp2(d, LogSlope(bin.h0)), d1 = Exp2(d, LogSlope(bin.h1));
     // In terms of xi, s = h / w and t = xi (1 - xi), as in [DBMP19]:
     //   den = s + (d0 + d1 - 2 s) t,  rise = (s xi^2 + d0 t) / den,  z = z0 + h rise,
     //   N = d1 xi^2 + 2 s t + d0 (1 - xi)^2,  ln S' = 2 ln s + ln N - 2 ln den.
