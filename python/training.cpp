@@ -17,10 +17,11 @@
 #include "arrays.h"
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "core/streams.h"
 #include "train/train.h"
 #include "train/training_options.h"
 #include "warp/scratch.h"
-#include "warpath/warp_file.h"
+#include "warp/warp_file.h"
 
 namespace warpath::python {
 namespace {
@@ -28,10 +29,6 @@ namespace {
 using namespace nb::literals;
 
 constexpr std::size_t kBatch = 2048;
-// Candidates are drawn from other numbers than what is drawn with what they taught, whatever the seed.
-constexpr std::uint64_t kCandidateStream = 0x63616e6469640003u;
-constexpr std::uint64_t kLatentStream = 0x6c6174656e740001u;
-constexpr std::uint32_t kComponentDimension = 0xfffffffeu;
 
 void for_batches(std::size_t count, const auto& body) {
   parallel((count + kBatch - 1) / kBatch,

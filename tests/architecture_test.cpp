@@ -15,18 +15,20 @@ namespace {
 
 const std::map<std::string, std::set<std::string>> kAllowed{
     {"core", {}},
+    {"path", {"core"}},
     {"scene", {"core"}},
-    {"tracer", {"scene", "core"}},
-    {"integrand", {"tracer", "scene", "core"}},
+    {"tracer", {"scene", "path", "core"}},
+    {"integrand", {"tracer", "scene", "path", "core"}},
     {"nn", {"core"}},
-    {"warp", {"nn", "core"}},
-    {"train", {"warp", "nn", "integrand", "core"}},
-    {"integrate", {"train", "warp", "integrand", "core"}},
-    {"estimate", {"warp", "integrand", "tracer", "scene", "core"}},
-    {"render", {"estimate", "train", "warp", "integrand", "tracer", "scene", "core"}},
-    {"report", {"core"}},
+    {"warp", {"nn", "path", "core"}},
+    {"train", {"warp", "nn", "path", "core"}},
+    {"integrate", {"train", "warp", "integrand", "path", "core"}},
+    {"estimate", {"warp", "integrand", "tracer", "scene", "path", "core"}},
+    {"render", {"estimate", "train", "warp", "integrand", "tracer", "scene", "path", "core"}},
+    {"report", {"path", "core"}},
     {"cli",
-     {"core", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "render", "report"}},
+     {"core", "path", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "render",
+      "report"}},
 };
 
 bool is_code(const fs::path& path) { return path.extension() == ".h" || path.extension() == ".cpp"; }

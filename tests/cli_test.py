@@ -62,8 +62,7 @@ class CommandLine(unittest.TestCase):
         self.fails(2, "train", BOX, "--warp", "none", "-o", self.path("a.warp"), says=["nothing to train"])
         self.fails(2, "train", BOX, "--warp", "auto", "-o", self.path("a.warp"), says=["nothing to train"])
         self.fails(2, "render", BOX, "--warp", "field:film", "-o", self.path("a.exr"), says=["field:film", "light_uv"])
-        self.fails(2, "render", BOX, "--warp", "neural:film+bounce1", "-o", self.path("a.exr"), says=["neural:film+bounce1", "light_uv"])
-        self.fails(2, "render", BOX, "--warp", "neural:bounce1", "-o", self.path("a.exr"), says=["bounce1.lobe+bounce1.dir"])
+        self.fails(2, "render", BOX, "--warp", "field:bounce1", "-o", self.path("a.exr"), says=["bounce1.lobe+bounce1.dir"])
         for method in ("kdtree:bounce1.lobe+bounce1", "spline:bounce1.lobe+bounce1"):
             self.fails(2, "render", BOX, "--warp", method, "--init", BOX, "-o", self.path("a.exr"), says=[method, "starts anew"])
         self.fails(2, "render", BOX, "--warp", "kdtree:bounce1.lobe+bounce1+bounce2.lobe+bounce2", "-o", self.path("a.exr"), says=["one vertex"])
@@ -83,7 +82,7 @@ class CommandLine(unittest.TestCase):
             self.fails(3, "render", BOX, "--warp", warp, "-o", self.path("a.exr"), says=["broken.warp"])
 
     def test_same_seed_same_file_for_any_number_of_threads(self):
-        for warp in ("none", "kdtree:film+bounce1", "field", "neural", "kdtree:bounce1.lobe+bounce1", "spline:bounce1.lobe+bounce1", "auto"):
+        for warp in ("none", "kdtree:film+bounce1", "field", "kdtree:bounce1.lobe+bounce1", "spline:bounce1.lobe+bounce1", "auto"):
             images = []
             for threads in (1, 2):
                 out = self.path(f"{threads}.exr")
@@ -123,17 +122,13 @@ class CommandLine(unittest.TestCase):
                 self.assertIn(f"{32 * 24 * 7} samples", result.stderr)
         result = self.warpath("render", BOX, "--warp", "field", "--init", warp, "--spp", 7, "-o", out, *SMALL)
         self.assertEqual(result.returncode, 0, result.stderr)
-        result = self.warpath("render", BOX, "--warp", "neural", "--init", warp, "-o", out)
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("starts anew", result.stderr)
         result = self.warpath("render", BOX, "--warp", "auto", "--spp", 32, "-o", out, *SMALL)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("auto: ", result.stderr)
 
     def test_warps_of_vertices_are_saved_with_the_numbers_that_they_warp(self):
         warp, out = self.path("box.warp"), self.path("out.exr")
-        for method, what in (("neural", "every vertex"), ("neural:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir"),
-                             ("field:bounce1.light+bounce1.light_uv", "bounce1.light+bounce1.light_uv"),
+        for method, what in (("field", "every vertex"), ("field:bounce1.light+bounce1.light_uv", "bounce1.light+bounce1.light_uv"),
                              ("kdtree:bounce1.lobe+bounce1", "bounce1.lobe+bounce1.dir"),
                              ("spline:bounce1.lobe+bounce1+bounce2.lobe+bounce2", "bounce2.lobe+bounce2.dir")):
             result = self.warpath("train", BOX, "--warp", method, "-o", warp, "--examples", 2048, "--batch", 256, *SMALL)

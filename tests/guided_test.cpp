@@ -10,10 +10,9 @@
 
 #include "estimate/image_estimator.h"
 #include "scene/scene.h"
-#include "train/conditional_kdtree_trainer.h"
-#include "train/conditional_spline_trainer.h"
-#include "train/field_trainer.h"
-#include "train/neural_trainer.h"
+#include "train/conditional_kdtree_learner.h"
+#include "train/conditional_spline_learner.h"
+#include "train/field_learner.h"
 
 namespace warpath {
 namespace {
@@ -37,31 +36,25 @@ const Tracer& box_tracer(int width, int height) {
 }
 
 /// What is to learn: cells and steps are small, so that a few samples teach much.
-std::unique_ptr<VertexTrainer> make_trainer(const std::string& family, const Tracer& tracer) {
-  NeuralSettings settings;
-  settings.field.split_at = 200;
-  settings.batch = 256;
-  settings.rate = 5e-3;
-  settings.min_visits = 4096;
-  if (family == "field:bounce1") settings.field.numbers = Layout::parse("bounce1.lobe+bounce1");
-  if (family == "field" || family == "field:bounce1")
-    return std::make_unique<FieldTrainer>(settings.field, tracer.emitters());
+std::unique_ptr<VertexLearner> make_learner(const std::string& family, const Tracer& tracer) {
+  FieldSettings field;
+  field.split_at = 200;
+  if (family == "field:bounce1") field.numbers = Layout::parse("bounce1.lobe+bounce1");
+  if (family == "field" || family == "field:bounce1") return std::make_unique<FieldLearner>(field, tracer.emitters());
   if (family == "spline:bounce1") {
     ConditionalSplineSettings spline;
     spline.numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
     spline.flow.batch = 256;
     spline.min_visits = 4096;
-    return std::make_unique<ConditionalSplineTrainer>(spline, 0.1, 1);
+    return std::make_unique<ConditionalSplineLearner>(spline, 0.1, 1);
   }
   if (family == "kdtree:bounce1") {
     ConditionalKdTreeSettings tree;
     tree.numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
     tree.tiles = 4;
     const FilmSettings& film = tracer.scene().film;
-    return std::make_unique<ConditionalKdTreeTrainer>(tree, film.width, film.height, 0.1);
+    return std::make_unique<ConditionalKdTreeLearner>(tree, film.width, film.height, 0.1);
   }
-  if (family == "neural:bounce1") settings.numbers = Layout::parse("bounce1.lobe+bounce1");
-  if (family != "none") return std::make_unique<NeuralTrainer>(settings, tracer.emitters(), 1);
   return nullptr;
 }
 
@@ -69,11 +62,11 @@ std::unique_ptr<VertexTrainer> make_trainer(const std::string& family, const Tra
 ImageEstimate guided(const Tracer& tracer, const std::vector<int>& spp, std::optional<Objective> objective,
                      const std::string& family, std::uint64_t seed) {
   ImageEstimator estimator(tracer, {}, nullptr, seed);
-  const auto trainer = make_trainer(family, tracer);
-  std::shared_ptr<const VertexWarp> warp;
+  const auto learner = make_learner(family, tracer);
+  std::shared_ptr<const VertexProposal> warp;
   for (const int n : spp) {
-    estimator.add_guided_pass(n, {warp.get(), trainer.get(), objective});
-    if (trainer) warp = trainer->warp();
+    estimator.add_guided_pass(n, {warp.get(), learner.get(), objective});
+    if (learner) warp = learner->fit();
   }
   return estimator.develop_rest();
 }
@@ -139,9 +132,9 @@ TEST(Guided, FieldsAndAllocationLeaveEveryPixelsMeanAsItIs) {
   }
 }
 
-TEST(Guided, NetworksAndTreesLeaveEveryPixelsMeanAsItIs) {
+TEST(Guided, ConditionalFlowsAndTreesLeaveEveryPixelsMeanAsItIs) {
   const Tracer& tracer = box_tracer(12, 8);
-  for (const char* family : {"neural", "neural:bounce1", "spline:bounce1", "kdtree:bounce1"}) {
+  for (const char* family : {"spline:bounce1", "kdtree:bounce1"}) {
     Spread spread;
     for (std::uint64_t seed = 0; seed < 200; ++seed)
       spread.add(guided(tracer, {16, 16, 32, 64}, Objective::relmse, family, seed));
@@ -160,7 +153,7 @@ TEST(Guided, CountsThatFollowFirefliesDoNotBiasThem) {
 }
 
 TEST(Guided, SameSeedSameBitsForAnyNumberOfThreads) {
-  for (const char* family : {"field", "neural", "spline:bounce1", "kdtree:bounce1"}) {
+  for (const char* family : {"field", "spline:bounce1", "kdtree:bounce1"}) {
     const auto bits = [&](int threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
       return guided(box_tracer(48, 32), {2, 2, 4, 8}, Objective::relmse, family, 7).mean;
@@ -175,7 +168,7 @@ TEST(Guided, SameSeedSameBitsForAnyNumberOfThreads) {
 // A warp that helps nothing would pass all else.
 TEST(Guided, WarpsLessenTheVariance) {
   const Tracer& tracer = box_tracer(48, 32);
-  const auto variance = [&](const VertexWarp* warp) {
+  const auto variance = [&](const VertexProposal* warp) {
     ImageEstimator estimator(tracer, {}, nullptr, 6);
     if (warp)
       estimator.add_guided_pass(64, {warp, nullptr, std::nullopt});
@@ -186,18 +179,14 @@ TEST(Guided, WarpsLessenTheVariance) {
     return sum;
   };
   const double plain_variance = variance(nullptr);
-  for (const char* family : {"field", "neural"}) {
-    ImageEstimator estimator(tracer, {}, nullptr, 5);
-    std::unique_ptr<VertexTrainer> trainer = std::make_unique<FieldTrainer>(FieldSettings{}, tracer.emitters());
-    if (std::string(family) == "neural")
-      trainer = std::make_unique<NeuralTrainer>(NeuralSettings{}, tracer.emitters(), 1);
-    std::shared_ptr<const VertexWarp> warp;
-    for (int pass = 0; pass < 8; ++pass) {
-      estimator.add_guided_pass(64, {nullptr, trainer.get(), std::nullopt});
-      warp = trainer->warp();
-    }
-    EXPECT_LT(variance(warp.get()), 0.9 * plain_variance) << family;
+  ImageEstimator estimator(tracer, {}, nullptr, 5);
+  FieldLearner learner({}, tracer.emitters());
+  std::shared_ptr<const VertexProposal> warp;
+  for (int pass = 0; pass < 8; ++pass) {
+    estimator.add_guided_pass(64, {nullptr, &learner, std::nullopt});
+    warp = learner.fit();
   }
+  EXPECT_LT(variance(warp.get()), 0.9 * plain_variance);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 #include "integrand/path_integrand.h"
 #include "scene/scene.h"
 #include "train/candidates.h"
-#include "train/field_trainer.h"
+#include "train/field_learner.h"
 #include "train/train.h"
 
 namespace warpath {
@@ -62,11 +62,11 @@ ImageEstimate render_field(Sampler sampler, const std::vector<int>& passes, std:
   ImageEstimator estimator(*box_tracer(), {}, nullptr, seed, sampler);
   FieldSettings settings;
   settings.split_at = 200;
-  FieldTrainer trainer(settings, box_tracer()->emitters());
+  FieldLearner learner(settings, box_tracer()->emitters());
   std::shared_ptr<const Field> field;
   for (const int spp : passes) {
-    estimator.add_guided_pass(spp, {field.get(), &trainer, Objective::mse});
-    field = trainer.fit();
+    estimator.add_guided_pass(spp, {field.get(), &learner, Objective::mse});
+    field = learner.fit();
   }
   return estimator.develop_rest();
 }

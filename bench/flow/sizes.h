@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "warpath/train.h"
+#include "train/settings.h"
 
 namespace warpath::bench {
 
@@ -39,7 +39,7 @@ inline RealNvpSize realnvp_size(int dims, int width, int couplings, bool shared)
   size.settings.width = width;
   size.settings.couplings = couplings;
   size.settings.blocks = 2;
-  size.settings.bins = 0;
+  size.settings.encoding_bins = 0;
   size.settings.shared = shared;
   size.settings.norm = RealNvpSettings::Norm::none;
   return size;

@@ -2,7 +2,7 @@
 from harness import Bound, Row
 
 #: Nanoseconds for the first three numbers of a vertex.
-MOST = {"field": 100, "neural": 300, "kdtree of the first hit": 150, "spline of the first hit": None}
+MOST = {"field": 100, "kdtree of the first hit": 150, "spline of the first hit": None}
 
 
 def rows(bench):

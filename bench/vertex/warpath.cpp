@@ -8,10 +8,10 @@
 #include "bench/nn/fma_peak.h"
 #include "core/floating_point.h"
 #include "core/rng.h"
-#include "core/vertex_context_buffer.h"
-#include "train/conditional_kdtree_trainer.h"
-#include "train/conditional_spline_trainer.h"
-#include "train/neural_trainer.h"
+#include "path/vertex.h"
+#include "train/conditional_kdtree_learner.h"
+#include "train/conditional_spline_learner.h"
+#include "train/field_learner.h"
 
 namespace {
 using namespace warpath;
@@ -20,38 +20,38 @@ constexpr std::size_t kVertices = 2048;
 
 /// Vertices on the walls of a room, as a batch of paths meets them: neighbours first, then all over.
 struct Vertices {
-  VertexContextBuffer buffer;
+  VertexBuffer buffer;
   explicit Vertices(std::uint64_t seed) {
     for (std::size_t i = 0; i < kVertices; ++i) {
       const std::uint64_t key = sample_key(seed, i);
-      VertexValues c;
-      for (std::uint32_t k = 0; k < 3; ++k) c[k] = sample_float(key, k), c[9 + k] = 0.5f;
-      const auto side = static_cast<std::size_t>(sample_float(key, 3) * 6);
-      for (std::size_t k = 0; k < 3; ++k) c[3 + k] = 0, c[6 + k] = 0.5f;
-      c[3 + side / 2] = side % 2 ? -1.0f : 1.0f;
-      c[side / 2] = side % 2 ? 1.0f : 0.0f;
-      c[12] = 1;
-      c[13] = c[0], c[14] = c[2];
-      const auto kind = static_cast<std::uint8_t>(SurfaceKind::diffuse);
-      const auto material = static_cast<std::uint32_t>(side);
-      buffer.add(c, kind, material);
+      const auto side = static_cast<std::uint32_t>(sample_float(key, 3) * 6);
+      Vertex v;
+      for (std::uint32_t k = 0; k < 3; ++k) v.position[k] = sample_float(key, k);
+      v.position[side / 2] = side % 2 ? 1.0f : 0.0f;
+      v.normal[side / 2] = side % 2 ? -1.0f : 1.0f;
+      v.wi = v.albedo = {0.5f, 0.5f, 0.5f};
+      v.roughness = 1;
+      v.film = {v.position[0], v.position[2]};
+      v.kind = static_cast<std::uint8_t>(SurfaceKind::diffuse);
+      v.material = side;
+      buffer.add(v);
     }
   }
 };
 
 /// What passes would teach: light from a corner.
-std::shared_ptr<const VertexWarp> teach(VertexTrainer& trainer) {
+std::shared_ptr<const VertexProposal> teach(VertexLearner& learner) {
   for (std::uint64_t pass = 0; pass < 4; ++pass) {
     for (std::uint64_t b = 0; b < 64; ++b) {
       const Vertices vertices(100 * pass + b);
       std::array<std::vector<float>, kBounceDimensions> u;
-      std::vector<float> inv_q(kVertices, 1.0f), light, beyond;
+      std::vector<float> inv_q(kVertices, 1.0f), light, scatter_return;
       std::vector<std::uint32_t> lanes;
       for (std::uint32_t i = 0; i < kVertices; ++i) {
         for (std::uint32_t d = 0; d < kBounceDimensions; ++d)
           u[d].push_back(sample_float(sample_key(1000 + 100 * pass + b, i), d));
         light.push_back(u[1][i] < 0.3f && u[2][i] > 0.5f ? 1.0f : 0.0f);
-        beyond.push_back(u[4][i] < 0.5f && u[5][i] < vertices.buffer.view().position[0][i] ? 1.0f : 0.1f);
+        scatter_return.push_back(u[4][i] < 0.5f && u[5][i] < vertices.buffer.view().position[0][i] ? 1.0f : 0.1f);
         lanes.push_back(i);
       }
       VertexRecords records;
@@ -60,41 +60,37 @@ std::shared_ptr<const VertexWarp> teach(VertexTrainer& trainer) {
       records.context = vertices.buffer.view();
       for (std::size_t d = 0; d < kBounceDimensions; ++d) records.numbers[d] = u[d].data();
       records.inv_q_light = records.inv_q_scatter = inv_q.data();
-      records.light = light.data();
-      records.beyond = beyond.data();
-      const auto recorder = trainer.make_recorder();
+      records.light_return = light.data();
+      records.scatter_return = scatter_return.data();
+      const auto recorder = learner.make_recorder();
       recorder->record(records);
-      trainer.merge(*recorder);
+      learner.merge(*recorder);
     }
-    trainer.warp();
+    learner.fit();
   }
-  return trainer.warp();
+  return learner.fit();
 }
 
-std::shared_ptr<const VertexWarp> field() {
-  FieldTrainer trainer({}, 1);
-  return teach(trainer);
-}
-std::shared_ptr<const VertexWarp> neural() {
-  NeuralTrainer trainer({}, 1, 1);
-  return teach(trainer);
+std::shared_ptr<const VertexProposal> field() {
+  FieldLearner learner({}, 1);
+  return teach(learner);
 }
 
 const Layout& first_hit() {
   static const Layout numbers = Layout::parse("bounce1.light+bounce1.light_uv+bounce1.lobe+bounce1");
   return numbers;
 }
-std::shared_ptr<const VertexWarp> conditional_kdtree() {
+std::shared_ptr<const VertexProposal> conditional_kdtree() {
   ConditionalKdTreeSettings settings;
   settings.numbers = first_hit();
-  ConditionalKdTreeTrainer trainer(settings, 320, 180, 0.1);
-  return teach(trainer);
+  ConditionalKdTreeLearner learner(settings, 320, 180, 0.1);
+  return teach(learner);
 }
-std::shared_ptr<const VertexWarp> conditional_spline() {
+std::shared_ptr<const VertexProposal> conditional_spline() {
   ConditionalSplineSettings settings;
   settings.numbers = first_hit();
-  ConditionalSplineTrainer trainer(settings, 0.1, 1);
-  return teach(trainer);
+  ConditionalSplineLearner learner(settings, 0.1, 1);
+  return teach(learner);
 }
 
 /// CPU seconds of this thread: others may be using the machine.
@@ -104,7 +100,7 @@ double thread_seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-void draw(benchmark::State& state, const std::shared_ptr<const VertexWarp>& warp) {
+void draw(benchmark::State& state, const std::shared_ptr<const VertexProposal>& warp) {
   const FlushDenormals flush;
   const Vertices vertices(7);
   std::vector<std::uint32_t> places(kVertices * warp->place_size());
@@ -117,7 +113,7 @@ void draw(benchmark::State& state, const std::shared_ptr<const VertexWarp>& warp
   }
   double locating = 0, light = 0, scatter = 0;
   const auto context = vertices.buffer.view();
-  const auto sample = [&](VertexNumbers which) {
+  const auto sample = [&](VertexDecision which) {
     warp->sample(which, context, places.data(), kVertices, {z[0].data(), z[1].data(), z[2].data()},
                  {y[0].data(), y[1].data(), y[2].data()}, inv_q.data());
     benchmark::ClobberMemory();
@@ -127,9 +123,9 @@ void draw(benchmark::State& state, const std::shared_ptr<const VertexWarp>& warp
     warp->locate(context, kVertices, places.data());
     benchmark::ClobberMemory();
     const double located = thread_seconds();
-    sample(VertexNumbers::light);
+    sample(VertexDecision::light_sampling);
     const double lit = thread_seconds();
-    sample(VertexNumbers::scatter);
+    sample(VertexDecision::scattering);
     const double scattered = thread_seconds();
     locating += located - start, light += lit - located, scatter += scattered - lit;
   }
@@ -146,10 +142,6 @@ void draw_field(benchmark::State& state) {
   static const auto warp = field();
   draw(state, warp);
 }
-void draw_neural(benchmark::State& state) {
-  static const auto warp = neural();
-  draw(state, warp);
-}
 void draw_conditional_kdtree(benchmark::State& state) {
   static const auto warp = conditional_kdtree();
   draw(state, warp);
@@ -159,7 +151,6 @@ void draw_conditional_spline(benchmark::State& state) {
   draw(state, warp);
 }
 BENCHMARK(draw_field)->Name("draw/field");
-BENCHMARK(draw_neural)->Name("draw/neural");
 BENCHMARK(draw_conditional_kdtree)->Name("draw/kdtree of the first hit");
 BENCHMARK(draw_conditional_spline)->Name("draw/spline of the first hit");
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "warpath/batch.h"
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

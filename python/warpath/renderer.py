@@ -103,7 +103,7 @@ def render(scene: Scene, *, spp: int = 0, warp: str | os.PathLike[str] = "none",
     Args:
         scene: from `load_scene`.
         spp: samples per pixel; 0 takes the scene's.
-        warp: "none", FAMILY:DIMS (families: uniform, grid, kdtree, realnvp, spline), "field", "neural", "auto", or the
+        warp: "none", FAMILY:DIMS (families: uniform, grid, kdtree, realnvp, spline), "field", "auto", or the
             file of a trained warp.
         time: seconds for everything, in place of spp.
         objective: the error that samples are placed to lessen where the film is stratified: "mse", "relmse" or "even".

@@ -41,8 +41,7 @@ void add_options(CLI::App& app, TrainingOptions& options) {
       "Whether candidates count in the image: discard (as the paper does) or use")
       ->check(CLI::IsMember({"discard", "use"}));
 
-  constexpr auto kFlow =
-      "Real NVP and spline (without film, and neural: width, blocks, rate and batch, with defaults of their own)";
+  constexpr auto kFlow = "Real NVP and spline";
   const auto add_flow = [&](const char* name, auto& value, const char* help) {
     return app.add_option(name, value, help)->group(kFlow);
   };
@@ -61,7 +60,7 @@ void add_options(CLI::App& app, TrainingOptions& options) {
   add_sized("--blocks", options.blocks, "Residual blocks in each network", nvp.blocks, spline.blocks)
       ->check(CLI::Range(0, 64));
   add_sized("--encoding-bins", options.encoding_bins, "Bins of the one-blob encoding of what the networks see; 0: none",
-            nvp.bins, spline.encoding_bins)
+            nvp.encoding_bins, spline.encoding_bins)
       ->check(CLI::Range(0, 256));
   add_sized("--rate", options.rate, "Step size of Adam", nvp.rate, spline.rate)->check(CLI::PositiveNumber);
   add_sized("--jitter", options.jitter,
@@ -151,7 +150,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
   sub->add_option(
          "--warp", command.warp,
          "FAMILY[:DIMS] or a trained warp's file; families: none, uniform, grid, kdtree, realnvp, spline, field, "
-         "neural, auto")
+         "auto")
       ->capture_default_str();
   add_options(*sub, command.render);
   sub->add_option("--aov", command.render.aov, "Further layers: albedo, normal, depth")->type_name("LIST");
@@ -163,8 +162,7 @@ CLI::App* add_command(CLI::App& app, RenderCommand& command) {
 CLI::App* add_command(CLI::App& app, TrainCommand& command) {
   CLI::App* sub = app.add_subcommand("train", "Train a warp and save it");
   sub->add_option("scene", command.common.scene, "Mitsuba 3 scene file")->required();
-  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline; or field, neural")
-      ->required();
+  sub->add_option("--warp", command.warp, "FAMILY[:DIMS]: grid, kdtree, realnvp or spline; or field")->required();
   sub->add_option("-o,--output", command.output, "File to write (safetensors)")->required();
   add_options(*sub, command.common);
   add_options(*sub, command.training);

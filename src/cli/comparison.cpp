@@ -11,6 +11,7 @@
 #include "core/interrupt.h"
 #include "core/log.h"
 #include "core/rng.h"
+#include "core/streams.h"
 #include "report/densities.h"
 #include "train/marginals.h"
 #include "warpath/error.h"
@@ -18,8 +19,6 @@
 namespace warpath {
 namespace {
 
-/// The reference must not share a random number with what it judges.
-constexpr std::uint64_t kReferenceStream = 0x7265666572000004u;
 /// A reference needs this many times the samples, so that its own noise, which is subtracted, stays small.
 constexpr int kReferenceFactor = 8;
 

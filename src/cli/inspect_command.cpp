@@ -3,8 +3,8 @@
 #include "cli/commands.h"
 #include "core/tensor_file.h"
 #include "scene/scene.h"
+#include "warp/warp_file.h"
 #include "warpath/error.h"
-#include "warpath/warp_file.h"
 
 namespace warpath {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "path/layout.h"
 #include "render/method.h"
 #include "train/training_options.h"
-#include "warpath/layout.h"
 
 namespace warpath {
 

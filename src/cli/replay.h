@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/pass_record.h"
+#include "path/pass_record.h"
 #include "report/results.h"
 
 namespace warpath {

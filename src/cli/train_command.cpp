@@ -8,8 +8,8 @@
 #include "core/log.h"
 #include "render/method.h"
 #include "scene/scene.h"
+#include "warp/warp_file.h"
 #include "warpath/error.h"
-#include "warpath/warp_file.h"
 
 namespace warpath {
 namespace {
@@ -35,7 +35,7 @@ void train_on_passes(const TrainCommand& command, const Tracer& tracer, const Tr
   }
   if (!guide.warp || g_interrupted) throw Interrupted{};
   WarpFile file;
-  file.vertex_warp = guide.warp;
+  file.vertex_proposal = guide.warp;
   file.layout = parse_method(command.warp).layout;
   file.scene = tracer.scene().file.filename().string();
   file.settings = {{"paths", std::to_string(guide.taught)}, {"train_seconds", fmt::format("{:.3f}", clock())}};
@@ -51,8 +51,8 @@ void run(const TrainCommand& command) {
   const Method method = parse_method(command.warp);
   if (method.family == "none" || method.family == "uniform" || method.family == "auto" || !method.file.empty())
     throw ConfigError(
-        fmt::format("--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp or spline, or "
-                    "field or neural",
+        fmt::format("--warp {}: there is nothing to train; use FAMILY[:DIMS] with grid, kdtree, realnvp, spline "
+                    "or field",
                     command.warp));
   const auto tracer = std::make_shared<const Tracer>(load_scene(common, nullptr));
   const TrainSettings settings = command.training.train_settings(common.seed);

@@ -6,6 +6,7 @@
 
 #include "core/rng.h"
 #include "core/stopwatch.h"
+#include "core/streams.h"
 #include "estimate/film_positions.h"
 #include "estimate/vertex_source.h"
 #include "estimate/warped_source.h"
@@ -27,14 +28,6 @@ constexpr int kTile = 8;
 /// and edges would be the roughest part of an image that converges.
 constexpr int kEmissionRays = 4, kMostEmissionRays = 32;
 constexpr std::size_t kPathsPerEmissionRay = 4;
-
-// Streams of one seed that must not repeat each other's numbers.
-constexpr std::uint64_t kLatentStream = 0x6c6174656e740001u;
-constexpr std::uint64_t kEmissionStream = 0x656d697373690002u;
-constexpr std::uint64_t kAllocationStream = 0x616c6c6f63610005u;
-// Numbers of a latent's stream beyond those that stand for the dimensions of a path.
-constexpr std::uint32_t kComponentDimension = 0xfffffffeu;
-static_assert(kComponentDimension >= kFirstFreeDimension);
 
 /// Everything that a batch needs, kept from batch to batch.
 struct Job {

@@ -5,15 +5,15 @@
 #include <optional>
 #include <vector>
 
-#include "core/latents.h"
 #include "core/ordered.h"
-#include "core/vertex_recorder.h"
 #include "estimate/allocation.h"
 #include "estimate/film.h"
+#include "path/latents.h"
+#include "path/layout.h"
+#include "path/vertex_recorder.h"
 #include "tracer/tracer.h"
-#include "warp/vertex_warp.h"
-#include "warpath/layout.h"
-#include "warpath/warp.h"
+#include "warp/proposal.h"
+#include "warp/vertex_proposal.h"
 
 namespace warpath {
 
@@ -32,8 +32,8 @@ struct RenderCost {
 
 /// What a pass over a stratified film is told by the passes before it.
 struct Guidance {
-  const VertexWarp* warp = nullptr;      ///< draws the numbers of vertices; null: they are uniform
-  VertexLearner* learner = nullptr;      ///< is shown all vertices
+  const VertexProposal* warp = nullptr;  ///< draws the numbers of vertices; null: they are uniform
+  VertexObserver* learner = nullptr;     ///< is shown all vertices
   std::optional<Objective> objective{};  ///< samples go where it says; else every pixel has as many
   float weight = 1;                      ///< of a sample of this pass: must not depend on the values of this pass
 };

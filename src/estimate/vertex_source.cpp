@@ -39,7 +39,7 @@ void VertexSource::locate(std::uint16_t bounce, std::span<const std::uint32_t> l
   if (std::any_of(lanes.begin(), lanes.end(), is_known)) {
     unknown.clear();
     for (std::size_t i = 0; i < lanes.size(); ++i)
-      if (!is_known(lanes[i])) unknown.add(context, i);
+      if (!is_known(lanes[i])) unknown.add(context.at(i));
     if (unknown.size() > 0) m_warp.locate(unknown.view(), unknown.size(), places.data());
     // What was found out moves to where it belongs, the last one first.
     for (std::size_t i = lanes.size(), k = unknown.size(); i-- > 0;) {
@@ -58,7 +58,7 @@ void VertexSource::locate(std::uint16_t bounce, std::span<const std::uint32_t> l
   for (const std::uint32_t lane : lanes) located[lane] = bounce;
 }
 
-void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
+void VertexSource::draw_jointly(VertexDecision which, Group first, std::span<const std::uint32_t> lanes,
                                 const VertexContext& context, float* inv_q) {
   const std::size_t n = lanes.size();
   for (auto& z : m_scratch.z) z.resize(std::max(z.size(), n));
@@ -70,13 +70,13 @@ void VertexSource::draw_jointly(VertexNumbers which, Group first, std::span<cons
   m_warp.sample(which, context, m_scratch.places.data(), n, {z[0].data(), z[1].data(), z[2].data()},
                 {m_scratch.y[0].data(), m_scratch.y[1].data(), m_scratch.y[2].data()}, inv_q);
   m_drawn = first;
-  if (which == VertexNumbers::scatter && !m_brightness.empty())
+  if (which == VertexDecision::scattering && !m_brightness.empty())
     for (std::size_t i = 0; i < n; ++i) m_scratch.scattered[lanes[i]] = inv_q[i];
 }
 
 bool VertexSource::draw_roulette(Group group, std::span<const std::uint32_t> lanes, const VertexContext& context,
                                  float* u, float* inv_q) {
-  if (m_brightness.empty() || !m_warp.warps(VertexNumbers::scatter, group.bounce)) return false;
+  if (m_brightness.empty() || !m_warp.warps(VertexDecision::scattering, group.bounce)) return false;
   const std::size_t n = lanes.size();
   auto& [z, y, places, place_of_lane, located, scattered, expected, unknown] = m_scratch;
   z[0].resize(std::max(z[0].size(), n));
@@ -99,7 +99,7 @@ bool VertexSource::draw(Group group, std::span<const std::uint32_t> lanes, const
                         float* u1, float* inv_q) {
   const std::size_t n = lanes.size();
   const bool of_light = group.kind == GroupKind::light || group.kind == GroupKind::light_uv;
-  const VertexNumbers which = of_light ? VertexNumbers::light : VertexNumbers::scatter;
+  const VertexDecision which = of_light ? VertexDecision::light_sampling : VertexDecision::scattering;
   switch (group.kind) {
     case GroupKind::film:
       for (std::size_t i = 0; i < n; ++i) {

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "core/primary_source.h"
-#include "core/vertex_context_buffer.h"
-#include "warp/vertex_warp.h"
+#include "path/primary_source.h"
+#include "path/vertex.h"
+#include "warp/vertex_proposal.h"
 
 namespace warpath {
 
@@ -18,7 +18,7 @@ struct VertexSourceScratch {
   std::vector<std::uint16_t> located;                // lane -> bounce at which it was located last
   std::vector<float> scattered;                      // lane -> inv_q of what was scattered last
   std::vector<float> expected;
-  VertexContextBuffer unknown;  // those that are to be located one by one
+  VertexBuffer unknown;  // those that are to be located one by one
 };
 
 /// From a warp that lives at vertices to the numbers of a path: film positions as they are given, the numbers of each
@@ -30,7 +30,7 @@ class VertexSource final : public UniformSource {
  public:
   /// Views: film positions in [0,1), one per lane. brightness: the luminance that each path's pixel is thought to have,
   /// one per lane; empty: not known yet.
-  VertexSource(const Latents& latents, const VertexWarp& warp, std::span<const float> film_x,
+  VertexSource(const Latents& latents, const VertexProposal& warp, std::span<const float> film_x,
                std::span<const float> film_y, std::span<const float> brightness, VertexSourceScratch& scratch)
       : UniformSource(latents),
         m_warp(warp),
@@ -51,13 +51,13 @@ class VertexSource final : public UniformSource {
   /// The places of vertices, into m_scratch.places; those that were located at this bounce before are known.
   void locate(std::uint16_t bounce, std::span<const std::uint32_t> lanes, const VertexContext& context);
   /// Draws three numbers for each lane into m_scratch.y; `first` is the first of the two groups that hold them.
-  void draw_jointly(VertexNumbers which, Group first, std::span<const std::uint32_t> lanes,
+  void draw_jointly(VertexDecision which, Group first, std::span<const std::uint32_t> lanes,
                     const VertexContext& context, float* inv_q);
   /// Draws the numbers of roulette; false if they are to be uniform.
   bool draw_roulette(Group group, std::span<const std::uint32_t> lanes, const VertexContext& context, float* u,
                      float* inv_q);
 
-  const VertexWarp& m_warp;
+  const VertexProposal& m_warp;
   std::span<const float> m_film_x, m_film_y, m_brightness;
   VertexSourceScratch& m_scratch;
   Group m_drawn{GroupKind::film};  // the group that was drawn last together with its second one

@@ -9,17 +9,17 @@ namespace warpath {
 namespace {
 
 /// Uniform numbers, and `expected` back from everywhere.
-class Expects final : public VertexWarp {
+class Expects final : public VertexProposal {
  public:
   explicit Expects(float expected) : m_expected(expected) {}
   std::string family() const override { return "expects"; }
   void locate(const VertexContext&, std::size_t n, std::uint32_t* places) const override { std::fill_n(places, n, 0); }
-  void sample(VertexNumbers, const VertexContext&, const std::uint32_t*, std::size_t n,
+  void sample(VertexDecision, const VertexContext&, const std::uint32_t*, std::size_t n,
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override {
     for (std::size_t a = 0; a < 3; ++a) std::copy_n(z[a], n, y[a]);
     std::fill_n(inv_q, n, 1.0f);
   }
-  void inverse_density(VertexNumbers, const VertexContext&, const std::uint32_t*, std::size_t n,
+  void inverse_density(VertexDecision, const VertexContext&, const std::uint32_t*, std::size_t n,
                        const std::array<const float*, 3>&, float* inv_q) const override {
     std::fill_n(inv_q, n, 1.0f);
   }
@@ -42,7 +42,7 @@ constexpr std::size_t kPaths = 100000;
 
 /// Roulette at a vertex with throughput 1 under a pixel of brightness 1, where the renderer lets go on what is less
 /// than `survival`.
-Roulette play(const VertexWarp& warp, float survival, bool knows_brightness = true) {
+Roulette play(const VertexProposal& warp, float survival, bool knows_brightness = true) {
   std::vector<std::uint64_t> ids(kPaths);
   std::iota(ids.begin(), ids.end(), 0);
   std::vector<std::uint32_t> lanes(ids.begin(), ids.end());

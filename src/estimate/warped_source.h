@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 #include "warpath/batch.h"
 
 namespace warpath {

@@ -1,9 +1,9 @@
 #pragma once
 #include <memory>
 
+#include "path/integrand.h"
+#include "path/layout.h"
 #include "tracer/tracer.h"
-#include "warpath/integrand.h"
-#include "warpath/layout.h"
 
 namespace warpath {
 

@@ -2,7 +2,7 @@
 #include <memory>
 #include <string_view>
 
-#include "warpath/integrand.h"
+#include "path/integrand.h"
 
 namespace warpath {
 

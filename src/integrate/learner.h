@@ -6,7 +6,7 @@
 
 #include "train/training_data.h"
 #include "warp/grid.h"
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -1,80 +1,44 @@
 #pragma once
-#include <memory>
+#include <optional>
 #include <string>
-#include <vector>
 
-#include "core/pass_record.h"
-#include "train/vertex_trainer.h"
+#include "render/pass_policy.h"
 
 namespace warpath {
 
-/// A warp at vertices that `auto` may choose, with what learns it.
-struct Contender {
-  std::string name;  ///< as a method
-  std::unique_ptr<VertexTrainer> trainer;
-  // By count of operations, in paths of uniform numbers:
-  double path_cost;                          ///< of a path that it draws and learns from
-  double fit_cost;                           ///< of what it does between two passes
-  std::shared_ptr<const VertexWarp> warp{};  ///< what it has learned so far; null: nothing
-
-  // What was measured of it.
-  bool tried = false;
-  double error = 0;        ///< of one sample that it draws
-  double seconds = 0;      ///< for a sample per pixel
-  double fit_seconds = 0;  ///< of the last one
-};
-
-/// How `auto` chooses between uniform numbers and contenders, which differ in family and in the numbers that they warp:
-/// by the error of one sample times its cost, of a uniform pass and of one by each. All of them learn from the first
-/// passes, which are uniform. The first contender is always tried, the others if the budget is large enough that their
-/// trial costs little of it; then the best goes on alone. It is looked at again once it has learned more, and stops
-/// learning when that no longer pays.
-class Automatic {
+/// How `auto` chooses between uniform numbers and a warp of vertices that learns while it renders.
+///
+/// 1. The first passes are drawn uniformly, and the warp learns from them.
+/// 2. The next one is drawn by the warp. Its efficiency is one over the error of a sample times its cost, relative to
+///    that of the uniform pass before. A warp whose efficiency is hopeless is given up, else it goes on.
+/// 3. Once it has learned more it is looked at again, and given up unless it pays by then.
+/// 4. It stops learning when what passes teach lowers the error by less than learning costs.
+///
+/// What is given up is not tried again.
+class Automatic final : public Fixed {
  public:
-  /// by_clock: costs are measured, else they are counted in operations, so that choices repeat.
-  Automatic(std::vector<Contender> contenders, bool by_clock);
+  /// warp: its name as a method. by_clock: costs are measured, else they are counted, so that choices repeat.
+  Automatic(Schedule schedule, std::string warp, bool by_clock);
 
-  /// Decides on the pass that begins at `done` samples per pixel, whose spp may be lowered.
-  void plan(PassRecord& pass, int done) const;
-  /// Who draws and who learns from a pass; null: nobody.
-  const VertexWarp* warp(const PassRecord& pass) const;
-  VertexLearner* learner(const PassRecord& pass);
-  /// Those who learned from the pass take what it taught.
-  void fit(const PassRecord& pass);
-
-  /// What is known of a pass once it is done.
-  struct Measured {
-    int done;      ///< samples per pixel before it
-    double error;  ///< of one sample, see PixelMoments::error
-    double seconds_per_spp;
-    double paths_per_spp;
-    double spp_left;  ///< about as many are to follow, if they cost as much
-  };
-  /// Told of a pass that was planned here; notes in it what it chooses.
-  void judge(PassRecord& pass, const Measured& measured);
-
-  /// Repeats choices that were recorded: contenders that had no part in them are dropped.
-  void start_replay(const std::vector<PassRecord>& passes);
-  void replay(const PassRecord& pass);
-
-  /// What goes on in the end, why it was chosen, and until when it learns.
-  const std::string& choice() const { return m_choice; }
+  std::optional<PassRecord> plan(int done) override;
+  void judge(PassRecord& pass, const PassResult& result) override;
+  std::string choice() const override { return m_choice; }
 
  private:
-  const Contender* next_to_try() const;
-  double gain(const Contender& contender) const;
-  void drop_costly(const Measured& measured);
-  void choose(PassRecord& pass, const Contender* contender);
-  void watch_learning(const Measured& measured);
+  enum class State { trying, keeps, gave_up };
 
-  std::vector<Contender> m_contenders;
+  double efficiency(double error, double seconds_per_spp) const;
+  void choose(PassRecord& pass, State state, double efficiency);
+  void watch_learning(int done, double error);
+
+  std::string m_warp;
   bool m_by_clock;
-  bool m_chosen = false, m_settled = false, m_learns = true;
-  double m_plain_error = 0, m_plain_seconds = 0;
-  double m_last_error = 0;  // of the pass before, drawn by what was chosen
-  int m_flat = 0;           // passes in a row that learning has gained next to nothing for
+  State m_state = State::trying;
+  bool m_looked_again = false, m_learns = true;
+  double m_plain_error = 0, m_plain_seconds = 0;  // of one sample; for a sample per pixel
+  double m_last_error = 0;                        // of the pass before, drawn by the warp
+  int m_flat = 0;                                 // passes in a row that learning has gained next to nothing for
   std::string m_choice;
-  std::unique_ptr<VertexLearner> m_all;  // the learner of the last pass that taught several
 };
 
 }  // namespace warpath

@@ -11,12 +11,12 @@ namespace {
 using testing::ElementsAre;
 
 /// Learns nothing; counts how often it was shown a pass and asked for its warp.
-class FakeTrainer final : public VertexTrainer {
+class FakeTrainer final : public VertexLearner {
  public:
   explicit FakeTrainer(int& lessons) : m_lessons(lessons) {}
   std::unique_ptr<VertexRecorder> make_recorder() const override { return std::make_unique<Recorder>(); }
   void merge(VertexRecorder&) override {}
-  std::shared_ptr<const VertexWarp> warp() override {
+  std::shared_ptr<const VertexProposal> fit() override {
     ++m_lessons;
     return nullptr;
   }

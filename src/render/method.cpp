@@ -4,26 +4,23 @@
 #include <optional>
 
 #include "core/rng.h"
+#include "core/streams.h"
 #include "integrand/path_integrand.h"
 #include "train/candidates.h"
-#include "train/conditional_kdtree_trainer.h"
-#include "train/conditional_spline_trainer.h"
-#include "train/field_trainer.h"
-#include "train/neural_trainer.h"
+#include "train/conditional_kdtree_learner.h"
+#include "train/conditional_spline_learner.h"
+#include "train/field_learner.h"
 #include "train/train.h"
 #include "warp/field.h"
+#include "warp/warp_file.h"
 #include "warpath/error.h"
-#include "warpath/warp_file.h"
 
 namespace warpath {
 namespace {
 
-constexpr std::array<std::string_view, 9> kFamilies{"none",   "uniform", "grid",   "kdtree", "realnvp",
-                                                    "spline", "field",   "neural", "auto"};
+constexpr std::array<std::string_view, 8> kFamilies{"none",    "uniform", "grid",  "kdtree",
+                                                    "realnvp", "spline",  "field", "auto"};
 constexpr std::string_view kDefaultDimensions = "film+bounce1";
-
-/// Candidates are drawn from other numbers than the image, whatever its seed.
-constexpr std::uint64_t kCandidateStream = 0x63616e6469640003u;
 
 /// More candidates than this, 256 MB of them, are gathered and resampled in chunks of so many, where the family allows.
 constexpr std::uint64_t kChunk = std::uint64_t{1} << 26;
@@ -58,10 +55,10 @@ Method parse_method(const std::string& text) {
                                     text.substr(colon + 1)));
     return method;
   }
-  if (method.family == "field" || method.family == "neural") {
+  if (method.family == "field") {
     if (colon != std::string::npos) method.layout = Layout::parse(std::string_view(text).substr(colon + 1));
     try {
-      check_vertex_numbers(method.layout);
+      check_decisions(method.layout);
     } catch (const ConfigError& error) {
       throw ConfigError(fmt::format("\"{}\": {}", text, error.what()));
     }
@@ -145,23 +142,23 @@ void PreparedMethod::add_candidates(ImageEstimator& estimator) const {
   }
 }
 
-std::unique_ptr<VertexTrainer> MethodTrainer::conditional_trainer(const Method& method) const {
+std::unique_ptr<VertexLearner> MethodTrainer::conditional_trainer(const Method& method) const {
   if (method.family == "spline") {
     ConditionalSplineSettings settings = m_settings.conditional_spline;
     settings.numbers = method.layout;
-    return std::make_unique<ConditionalSplineTrainer>(settings, m_settings.uniform, m_settings.seed);
+    return std::make_unique<ConditionalSplineLearner>(settings, m_settings.uniform, m_settings.seed);
   }
   if (method.family == "kdtree") {
     ConditionalKdTreeSettings settings = m_settings.conditional_kdtree;
     settings.numbers = method.layout;
     const FilmSettings& film = m_tracer->scene().film;
-    return std::make_unique<ConditionalKdTreeTrainer>(settings, film.width, film.height, m_settings.uniform);
+    return std::make_unique<ConditionalKdTreeLearner>(settings, film.width, film.height, m_settings.uniform);
   }
   return nullptr;
 }
 
-std::vector<Contender> MethodTrainer::contenders(std::unique_ptr<VertexTrainer> field,
-                                                 std::shared_ptr<const VertexWarp> warp) const {
+std::vector<Contender> MethodTrainer::contenders(std::unique_ptr<VertexLearner> field,
+                                                 std::shared_ptr<const VertexProposal> warp) const {
   std::vector<Contender> all;
   all.push_back({"field", std::move(field), kFieldCost, 0, std::move(warp)});
   const auto add = [&](const char* name, double path_cost, double fit_cost) {
@@ -179,10 +176,10 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
   if (!method.file.empty()) {
     const WarpFile file = load_warp(method.file);
     prepared.proposal = file.proposal;
-    prepared.guide.warp = file.vertex_warp;
+    prepared.guide.warp = file.vertex_proposal;
     return prepared;
   }
-  if (is_conditional(method.layout))
+  if (are_decisions(method.layout))
     if (auto trainer = conditional_trainer(method)) {
       if (!m_init.empty())
         throw ConfigError(
@@ -190,21 +187,12 @@ PreparedMethod MethodTrainer::prepare(const Method& method) {
       prepared.guide.trainer = std::move(trainer);
       return prepared;
     }
-  if (method.family == "neural") {
-    NeuralSettings settings = m_settings.neural;
-    settings.field = m_settings.field;
-    settings.numbers = method.layout;
-    if (!m_init.empty())
-      throw ConfigError(fmt::format("--init {}: neural starts anew; field can start from a field", m_init.string()));
-    prepared.guide.trainer = std::make_unique<NeuralTrainer>(settings, m_tracer->emitters(), m_settings.seed);
-    return prepared;
-  }
   if (method.family == "field" || method.family == "auto") {
     FieldSettings settings = m_settings.field;
     settings.numbers = method.layout;
-    auto trainer = std::make_unique<FieldTrainer>(settings, m_tracer->emitters());
+    auto trainer = std::make_unique<FieldLearner>(settings, m_tracer->emitters());
     if (!m_init.empty()) {
-      const auto field = std::dynamic_pointer_cast<const Field>(load_warp(m_init).vertex_warp);
+      const auto field = std::dynamic_pointer_cast<const Field>(load_warp(m_init).vertex_proposal);
       if (!field)
         throw ConfigError(fmt::format("--init {}: not a field, which {} starts from", m_init.string(), method.family));
       trainer->start_from(*field);

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "estimate/image_estimator.h"
+#include "path/layout.h"
 #include "render/render_loop.h"
 #include "tracer/tracer.h"
+#include "train/settings.h"
 #include "train/training_data.h"
-#include "warpath/layout.h"
-#include "warpath/train.h"
 
 namespace warpath {
 
@@ -71,8 +71,9 @@ class MethodTrainer {
                       PreparedMethod& prepared);
   /// What `auto` chooses from: the field at every vertex, which may know something already, and warps of the first hit,
   /// which cost less.
-  std::vector<Contender> contenders(std::unique_ptr<VertexTrainer> field, std::shared_ptr<const VertexWarp> warp) const;
-  std::unique_ptr<VertexTrainer> conditional_trainer(const Method& method) const;
+  std::vector<Contender> contenders(std::unique_ptr<VertexLearner> field,
+                                    std::shared_ptr<const VertexProposal> warp) const;
+  std::unique_ptr<VertexLearner> conditional_trainer(const Method& method) const;
 
   std::shared_ptr<const Tracer> m_tracer;
   TrainSettings m_settings;

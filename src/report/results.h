@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/pass_record.h"
+#include "path/pass_record.h"
 #include "report/metrics.h"
 
 namespace warpath {

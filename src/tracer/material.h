@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "core/math.h"
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 #include "scene/scene.h"
 
 namespace warpath {

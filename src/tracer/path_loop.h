@@ -1,5 +1,5 @@
 #pragma once
-#include "core/vertex_recorder.h"
+#include "path/vertex_recorder.h"
 #include "tracer/compiled_scene.h"
 #include "tracer/path_recorder.h"
 #include "tracer/tracer.h"

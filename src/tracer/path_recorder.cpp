@@ -14,17 +14,7 @@ void PathRecorder::begin_bounce(std::uint16_t number, std::span<const std::uint3
   const std::size_t n = vertex_lanes.size();
   b.bounce = number;
   b.lanes.assign(vertex_lanes.begin(), vertex_lanes.end());
-  const VertexContext view = context.view();
-  for (std::size_t k = 0; k < 3; ++k) {
-    b.context[k].assign(view.position[k], view.position[k] + n);
-    b.context[3 + k].assign(view.normal[k], view.normal[k] + n);
-    b.context[6 + k].assign(view.wi[k], view.wi[k] + n);
-    b.context[9 + k].assign(view.albedo[k], view.albedo[k] + n);
-  }
-  b.context[12].assign(view.roughness, view.roughness + n);
-  for (std::size_t k = 0; k < 2; ++k) b.context[13 + k].assign(view.film[k], view.film[k] + n);
-  b.kind.assign(view.kind, view.kind + n);
-  b.material.assign(view.material, view.material + n);
+  b.vertices.assign(context.view(), n);
   for (auto& values : b.numbers) values.assign(n, 0.0f);
   b.inv_q_light.assign(n, 1.0f);
   b.inv_q_scatter.assign(n, 1.0f);
@@ -40,38 +30,27 @@ void PathRecorder::finish(VertexRecorder& recorder) {
   m_returned.assign(m_entry.size(), Color(0.0f));
   for (std::size_t k = m_used; k-- > 0;) {
     Bounce& b = m_bounces[k];
-    b.light_luminance.resize(b.lanes.size());
-    b.beyond_luminance.resize(b.lanes.size());
+    b.light_return.resize(b.lanes.size());
+    b.scatter_return.resize(b.lanes.size());
     for (std::size_t i = 0; i < b.lanes.size(); ++i) {
       Color& returned = m_returned[b.lanes[i]];
-      const Color beyond = b.step[i] * (b.emission[i] + returned);
-      b.light_luminance[i] = luminance(b.light[i]);
-      b.beyond_luminance[i] = luminance(beyond);
-      returned = b.light[i] + beyond;
+      const Color scattered = b.step[i] * (b.emission[i] + returned);
+      b.light_return[i] = luminance(b.light[i]);
+      b.scatter_return[i] = luminance(scattered);
+      returned = b.light[i] + scattered;
     }
   }
   for (std::size_t k = 0; k < m_used; ++k) {
     const Bounce& b = m_bounces[k];
-    const auto vec3 = [&](std::size_t first) {
-      return std::array<const float*, 3>{b.context[first].data(), b.context[first + 1].data(),
-                                         b.context[first + 2].data()};
-    };
     VertexRecords records;
     records.bounce = b.bounce;
     records.lanes = b.lanes;
-    records.context = {vec3(0),
-                       vec3(3),
-                       vec3(6),
-                       vec3(9),
-                       b.context[12].data(),
-                       b.kind.data(),
-                       b.material.data(),
-                       {b.context[13].data(), b.context[14].data()}};
+    records.context = b.vertices.view();
     for (std::size_t d = 0; d < kBounceDimensions; ++d) records.numbers[d] = b.numbers[d].data();
     records.inv_q_light = b.inv_q_light.data();
     records.inv_q_scatter = b.inv_q_scatter.data();
-    records.light = b.light_luminance.data();
-    records.beyond = b.beyond_luminance.data();
+    records.light_return = b.light_return.data();
+    records.scatter_return = b.scatter_return.data();
     recorder.record(records);
   }
 }

@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/vertex_recorder.h"
+#include "path/vertex_recorder.h"
 #include "tracer/workspace.h"
 
 namespace warpath {
@@ -31,13 +31,12 @@ class PathRecorder {
  private:
   struct Bounce {
     std::uint16_t bounce = 0;
-    std::vector<std::uint32_t> lanes, material;
-    std::array<std::vector<float>, 15> context;  // position, normal, wi, albedo, roughness, film
-    std::vector<std::uint8_t> kind;
+    std::vector<std::uint32_t> lanes;
+    VertexBuffer vertices;
     std::array<std::vector<float>, kBounceDimensions> numbers;
     std::vector<float> inv_q_light, inv_q_scatter;
     std::vector<Color> light, step, emission;
-    std::vector<float> light_luminance, beyond_luminance;
+    std::vector<float> light_return, scatter_return;
   };
   Bounce& bounce() { return m_bounces[m_used - 1]; }
 

@@ -167,23 +167,23 @@ void PathLoop::fill_context() {
     for (std::size_t k = group.begin; k < group.end; ++k) {
       const std::uint32_t j = w.order[k];
       const Vec3 wi = w.plain.wi[k];
-      c.position.set(j, w.position[k]);
-      c.wi.set(j, wi);
+      set(c.position, j, w.position[k]);
+      set(c.wi, j, wi);
       Color a;
       if (group.plain) {
         const Vec3 n = w.plain.normal[k];
-        c.normal.set(j, n.dot(wi) < 0 ? -n : n);
+        set(c.normal, j, n.dot(wi) < 0 ? -n : n);
         a = plain_albedo(*group.plain, n.dot(wi), w.plain.reflectance.color(k));
         c.roughness[j] = plain_roughness(*group.plain);
         c.kind[j] = static_cast<std::uint8_t>(plain_kind(*group.plain));
       } else {
         const Scatter& scatter = w.scatter[k];
-        c.normal.set(j, shading_normal(scatter));
+        set(c.normal, j, shading_normal(scatter));
         a = albedo(scatter);
         c.roughness[j] = roughness(scatter);
         c.kind[j] = static_cast<std::uint8_t>(kind(scatter));
       }
-      c.albedo.set(j, {a.x, a.y, a.z});
+      set(c.albedo, j, {a.x, a.y, a.z});
       const std::uint32_t lane = w.vertex_lanes[j];
       c.film[0][j] = w.film.u0[lane];
       c.film[1][j] = w.film.u1[lane];

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstddef>
 
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 #include "scene/scene.h"
 #include "tracer/lobe.h"
 #include "tracer/vec3_array.h"

@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "core/primary_source.h"
-#include "core/vertex_recorder.h"
+#include "path/primary_source.h"
+#include "path/vertex_recorder.h"
 #include "scene/scene.h"
 
 namespace warpath {

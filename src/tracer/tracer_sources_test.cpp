@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "path/layout.h"
 #include "tracer/test_scene.h"
 #include "tracer/tracer.h"
-#include "warpath/layout.h"
 
 namespace warpath {
 namespace {
@@ -156,12 +156,12 @@ TEST(Sources, WeightsOfAWarpedSourceLeaveTheMeanAlone) {
 
 class SumRecorder : public VertexRecorder {
  public:
-  explicit SumRecorder(std::size_t lanes) : first(lanes, 0.0f), last_beyond(lanes, 0.0f) {}
+  explicit SumRecorder(std::size_t lanes) : first(lanes, 0.0f), last_scatter_return(lanes, 0.0f) {}
   void record(const VertexRecords& r) override {
     EXPECT_EQ(r.bounce, bounces + 1) << "bounce by bounce";
     bounces = r.bounce;
     for (std::size_t i = 0; i < r.lanes.size(); ++i) {
-      if (r.bounce == 1) first[r.lanes[i]] = r.light[i] + r.beyond[i];
+      if (r.bounce == 1) first[r.lanes[i]] = r.light_return[i] + r.scatter_return[i];
       for (const float* number : r.numbers) {
         EXPECT_GE(number[i], 0);
         EXPECT_LT(number[i], 1);
@@ -172,7 +172,7 @@ class SumRecorder : public VertexRecorder {
     }
     vertices += r.lanes.size();
   }
-  std::vector<float> first, last_beyond;
+  std::vector<float> first, last_scatter_return;
   std::uint16_t bounces = 0;
   std::size_t vertices = 0;
 };

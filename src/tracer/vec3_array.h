@@ -15,4 +15,8 @@ struct Vec3Array {
   std::array<const float*, 3> pointers() const { return {x, y, z}; }
 };
 
+inline void set(const std::array<float*, 3>& arrays, std::size_t i, const Vec3& v) {
+  arrays[0][i] = v.x, arrays[1][i] = v.y, arrays[2][i] = v.z;
+}
+
 }  // namespace warpath

@@ -18,19 +18,14 @@ void* Arena::next() {
 }
 
 VertexContext ContextArrays::view() const {
-  return {position.pointers(), normal.pointers(), wi.pointers(), albedo.pointers(), roughness, kind, material,
-          {film[0], film[1]},  throughput};
+  VertexContext context;
+  for_each_field(context, *this, [](auto& to, auto* from) { to = from; });
+  context.throughput = throughput;
+  return context;
 }
 
 void ContextArrays::copy(std::size_t to, const ContextArrays& source, std::size_t from) const {
-  position.set(to, source.position[from]);
-  normal.set(to, source.normal[from]);
-  wi.set(to, source.wi[from]);
-  albedo.set(to, source.albedo[from]);
-  roughness[to] = source.roughness[from];
-  kind[to] = source.kind[from];
-  material[to] = source.material[from];
-  for (std::size_t a = 0; a < 2; ++a) film[a][to] = source.film[a][from];
+  for_each_field(*this, source, [&](auto* values, const auto* others) { values[to] = others[from]; });
   throughput[to] = source.throughput[from];
 }
 
@@ -45,8 +40,11 @@ void Workspace::resize(std::size_t n) {
   };
   const auto numbers = [&] { return DrawnNumbers{floats(), floats(), floats()}; };
   const auto contexts = [&] {
-    return ContextArrays{vectors(), vectors(), vectors(), vectors(), floats(), bytes(), indices(), {floats(), floats()},
-                         floats()};
+    ContextArrays arrays;
+    const auto take = [&]<class T>(T*& values, const auto&) { values = m_arena.take<T>(); };
+    for_each_field(arrays, arrays, take);
+    arrays.throughput = floats();
+    return arrays;
   };
   beta = vectors();
   weight = floats();

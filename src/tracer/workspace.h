@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 #include "tracer/light_samples.h"
 #include "tracer/plain_bsdf.h"
 #include "tracer/ray_stream.h"
@@ -43,13 +43,8 @@ struct DrawnNumbers {
 };
 
 /// What a VertexContext points to.
-struct ContextArrays {
-  Vec3Array position, normal, wi, albedo;
-  float* roughness;
-  std::uint8_t* kind;
-  std::uint32_t* material;
-  std::array<float*, 2> film;
-  float* throughput;
+struct ContextArrays : VertexFields<float*, std::uint8_t*, std::uint32_t*> {
+  float* throughput = nullptr;
   VertexContext view() const;
   void copy(std::size_t to, const ContextArrays& source, std::size_t from) const;
 };

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/interrupt.h"
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 #include "train/test_integrand.h"
 
 namespace warpath {

@@ -1,9 +1,9 @@
 #pragma once
 #include <memory>
 
+#include "train/settings.h"
 #include "train/training_data.h"
 #include "warp/grid.h"
-#include "warpath/train.h"
 
 namespace warpath {
 

@@ -1,9 +1,9 @@
 #pragma once
 #include <memory>
 
+#include "train/settings.h"
 #include "train/training_data.h"
 #include "warp/kdtree.h"
-#include "warpath/train.h"
 
 namespace warpath {
 

@@ -17,7 +17,7 @@ RealNvpSettings released_realnvp() {
   s.blocks = 8;
   s.rate = 1e-4;
   s.jitter = 0;
-  s.bins = 0;
+  s.encoding_bins = 0;
   s.shared = false;
   s.loss = RealNvpSettings::Loss::likelihood;
   s.masks = RealNvpSettings::Masks::alternating;
@@ -36,7 +36,7 @@ Floats start_from(const Proposal& init, const realnvp::Flow& flow) {
   const RealNvpSettings &a = warp->settings(), &b = flow.settings();
   const auto text = [](const RealNvpSettings& s, int dims) {
     return fmt::format("{}D, {} couplings x {}, {} blocks, {} bins, {}, {} masks, norm {}", dims, s.couplings, s.width,
-                       s.blocks, s.bins, s.shared ? "shared" : "separate",
+                       s.blocks, s.encoding_bins, s.shared ? "shared" : "separate",
                        s.masks == RealNvpSettings::Masks::binary ? "binary" : "alternating", static_cast<int>(s.norm));
   };
   if (text(a, warp->dims()) != text(b, flow.dims()))

@@ -1,8 +1,8 @@
 #pragma once
 #include <cstdint>
 
+#include "train/settings.h"
 #include "train/training_data.h"
-#include "warpath/train.h"
 
 namespace warpath {
 

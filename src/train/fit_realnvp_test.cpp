@@ -61,7 +61,7 @@ TEST(FitRealNvp, TenStepsAgreeWithPyTorch) {
     s.blocks = run.at("blocks");
     s.shared = run.at("shared");
     s.loss = RealNvpSettings::Loss::likelihood;
-    s.bins = 0;
+    s.encoding_bins = 0;
     s.masks = RealNvpSettings::Masks::alternating;
     const std::string norm = run.at("norm");
     SCOPED_TRACE(norm);
@@ -238,7 +238,7 @@ TEST(FitRealNvp, JitterKeepsSmallSetsFromBeingLearnedByHeart) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     RealNvpSettings s = small();
     s.batch = 190;
-    s.bins = 15;
+    s.encoding_bins = 15;
     s.max_steps = s.evaluate_every = 1'000;
     double loss[2], training_loss[2];
     for (const bool moved : {false, true}) {

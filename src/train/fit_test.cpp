@@ -13,8 +13,8 @@
 #include "warp/check.h"
 #include "warp/mixture.h"
 #include "warp/uniform.h"
+#include "warp/warp_file.h"
 #include "warpath/error.h"
-#include "warpath/warp_file.h"
 
 namespace warpath {
 namespace {

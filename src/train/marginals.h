@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "train/training_data.h"
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <functional>
 
+#include "path/integrand.h"
 #include "train/candidates.h"
-#include "warpath/integrand.h"
 
 namespace warpath {
 

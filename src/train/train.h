@@ -3,8 +3,8 @@
 #include <functional>
 #include <string>
 
+#include "train/settings.h"
 #include "train/training_data.h"
-#include "warpath/train.h"
 
 namespace warpath {
 

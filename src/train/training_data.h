@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
+#include "path/integrand.h"
+#include "path/layout.h"
 #include "warpath/batch.h"
-#include "warpath/integrand.h"
-#include "warpath/layout.h"
 
 namespace warpath {
 

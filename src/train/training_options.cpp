@@ -36,7 +36,7 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
     give(couplings, result.realnvp.couplings);
     give(width, result.realnvp.width);
     give(blocks, result.realnvp.blocks);
-    give(encoding_bins, result.realnvp.bins);
+    give(encoding_bins, result.realnvp.encoding_bins);
     give(rate, result.realnvp.rate);
   }
   for (SplineSettings* spline : {&result.spline, &result.conditional_spline.flow}) {
@@ -47,10 +47,6 @@ TrainSettings TrainingOptions::train_settings(std::uint64_t seed) const {
     give(bins, spline->bins);
     give(rate, spline->rate);
   }
-  give(width, result.neural.width);
-  give(blocks, result.neural.blocks);
-  give(rate, result.neural.rate);
-  give(batch, result.neural.batch);
   give(bins, result.grid.bins);
   const bool likelihood = is_second("loss", loss, "variance", "likelihood");
   for (FlowTraining* flow :

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "warpath/train.h"
+#include "train/settings.h"
 
 namespace warpath {
 

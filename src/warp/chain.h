@@ -1,5 +1,5 @@
 #pragma once
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -13,7 +13,7 @@ namespace warpath {
 namespace {
 
 constexpr int kNumbers = 3;  // of a vertex that are drawn as one
-constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
+constexpr std::array kBoth{VertexDecision::light_sampling, VertexDecision::scattering};
 constexpr std::array<const char*, 2> kNames{"light.", "scatter."};
 
 /// A box of numbers and the box of latents that is mapped to it.
@@ -106,7 +106,7 @@ std::array<float, 3> ConditionalKdTree::descend(const Flat& flat, std::uint32_t 
   return y;
 }
 
-void ConditionalKdTree::sample(VertexNumbers which, const VertexContext&, const std::uint32_t* places, std::size_t n,
+void ConditionalKdTree::sample(VertexDecision which, const VertexContext&, const std::uint32_t* places, std::size_t n,
                                const std::array<const double*, 3>& z, const std::array<float*, 3>& y,
                                float* inv_q) const {
   const Flat& flat = m_trees[static_cast<std::size_t>(which)];
@@ -130,7 +130,7 @@ void ConditionalKdTree::sample(VertexNumbers which, const VertexContext&, const 
   }
 }
 
-void ConditionalKdTree::inverse_density(VertexNumbers which, const VertexContext&, const std::uint32_t* places,
+void ConditionalKdTree::inverse_density(VertexDecision which, const VertexContext&, const std::uint32_t* places,
                                         std::size_t n, const std::array<const float*, 3>& y, float* inv_q) const {
   for (std::size_t i = 0; i < n; ++i)
     inv_q[i] = inverse_density(m_trees[static_cast<std::size_t>(which)], places + i * place_size(),
@@ -146,7 +146,7 @@ void ConditionalKdTree::save(TensorFile& file, const std::string& prefix) const 
   meta[prefix + "tilings"] = std::to_string(m_tiling.tilings);
   const std::array<float, 1> uniform{static_cast<float>(m_uniform)};
   file.put<float>(prefix + "uniform", {1}, uniform);
-  for (const VertexNumbers which : kBoth) {
+  for (const VertexDecision which : kBoth) {
     const Flat& flat = m_trees[static_cast<std::size_t>(which)];
     const std::string name = prefix + kNames[static_cast<std::size_t>(which)];
     std::vector<std::int32_t> sizes;
@@ -178,12 +178,12 @@ std::shared_ptr<const ConditionalKdTree> ConditionalKdTree::load(const TensorFil
   tiling.columns = load_int(file, prefix, "columns", 1, 1 << 12);
   tiling.rows = load_int(file, prefix, "rows", 1, 1 << 12);
   tiling.tilings = load_int(file, prefix, "tilings", 1, kMostTilings);
-  Layout numbers = load_vertex_numbers(file, prefix);
+  Layout numbers = load_decisions(file, prefix);
   const std::vector<float> uniform = file.get<float>(prefix + "uniform").values;
   if (uniform.size() != 1 || !(uniform[0] >= 0 && uniform[0] < 1))
     fail_load(file, prefix, "its share of uniform numbers is not in [0, 1)");
   std::array<Trees, 2> trees;
-  for (const VertexNumbers which : kBoth) {
+  for (const VertexDecision which : kBoth) {
     const std::string name = prefix + kNames[static_cast<std::size_t>(which)];
     const auto sizes = file.get<std::int32_t>(name + "sizes").values;
     const auto dims = file.get<std::uint8_t>(name + "dim").values;

@@ -6,33 +6,33 @@
 
 #include "warp/film_tiling.h"
 #include "warp/kdtree.h"
-#include "warp/vertex_numbers.h"
+#include "warp/vertex_decision.h"
 
 namespace warpath {
 
 /// A density over the numbers of one vertex given where on the film the path began: the mean of the kd-trees of the
 /// tiles that lie there, mixed with a share of uniform numbers, which keeps weights bounded. Sampling is a look-up in
 /// one tree, its density a look-up in each.
-class ConditionalKdTree final : public VertexWarp {
+class ConditionalKdTree final : public VertexProposal {
  public:
   static constexpr int kMostTilings = 8;
   /// A tree over three numbers for each tile of all tilings; no nodes where nothing was learned.
   using Trees = std::vector<KdTree::Nodes>;
   /// trees: for the numbers of light sampling and of scattering; each a tree (see KdTree::problem) or empty. uniform:
-  /// in [0,1). numbers: those that it draws, see check_vertex_numbers.
+  /// in [0,1). numbers: those that it draws, see check_decisions.
   ConditionalKdTree(const FilmTiling& tiling, const std::array<Trees, 2>& trees, double uniform, Layout numbers);
 
   std::string family() const override { return "conditional-kdtree"; }
-  bool warps(VertexNumbers which, std::uint16_t bounce) const override {
-    return holds_vertex_numbers(m_numbers, which, bounce);
+  bool warps(VertexDecision which, std::uint16_t bounce) const override {
+    return holds_decision(m_numbers, which, bounce);
   }
   const Layout& numbers() const { return m_numbers; }
   /// A place is a tile of each tiling.
   std::size_t place_size() const override { return static_cast<std::size_t>(m_tiling.tilings); }
   void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;
-  void sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
+  void sample(VertexDecision which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override;
-  void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
+  void inverse_density(VertexDecision which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                        const std::array<const float*, 3>& y, float* inv_q) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
   /// Throws FileError.

@@ -7,7 +7,7 @@
 
 #include "core/rng.h"
 #include "core/tensor_file.h"
-#include "warp/vertex_warp_fixture.h"
+#include "warp/vertex_proposal_fixture.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -15,7 +15,7 @@ namespace {
 
 using test::draw, test::Drawn, test::kVertices;
 
-constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
+constexpr std::array kBoth{VertexDecision::light_sampling, VertexDecision::scattering};
 constexpr FilmTiling kTiling{3, 2, 3};
 
 /// A tree of random splits, three deep.
@@ -48,7 +48,7 @@ TEST(FilmTiling, TilesOfOneTilingAreShiftedAgainstThoseOfAnother) {
 }
 
 TEST(ConditionalKdTree, SamplesAndDensitiesAgree) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   for (const double uniform : {0.0, 0.2}) {
     const ConditionalKdTree tree = example(uniform);
     for (const auto which : kBoth) {
@@ -69,12 +69,13 @@ TEST(ConditionalKdTree, DrawsFollowTheDensity) {
   const ConditionalKdTree tree = example();
   constexpr int kSide = 48;  // latents along each axis
   constexpr std::size_t n = kSide * kSide * kSide;
-  VertexContextBuffer buffer;
+  VertexBuffer buffer;
   std::array<std::vector<double>, 3> z;
   for (std::size_t i = 0; i < n; ++i) {
-    VertexValues values{};
-    values[13] = values[14] = 0.4f;
-    buffer.add(values, 1, 0);
+    Vertex vertex;
+    vertex.film = {0.4f, 0.4f};
+    vertex.kind = 1;
+    buffer.add(vertex);
     z[0].push_back((static_cast<double>(i % kSide) + 0.5) / kSide);
     z[1].push_back((static_cast<double>(i / kSide % kSide) + 0.5) / kSide);
     z[2].push_back((static_cast<double>(i / kSide / kSide) + 0.5) / kSide);
@@ -85,11 +86,11 @@ TEST(ConditionalKdTree, DrawsFollowTheDensity) {
   for (auto* numbers : {&y, &grid})
     for (auto& values : *numbers) values.resize(n);
   std::vector<float> inv_q(n);
-  tree.sample(VertexNumbers::light, buffer.view(), places.data(), n, {z[0].data(), z[1].data(), z[2].data()},
+  tree.sample(VertexDecision::light_sampling, buffer.view(), places.data(), n, {z[0].data(), z[1].data(), z[2].data()},
               {y[0].data(), y[1].data(), y[2].data()}, inv_q.data());
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t i = 0; i < n; ++i) grid[a][i] = static_cast<float>(z[a][i]);
-  tree.inverse_density(VertexNumbers::light, buffer.view(), places.data(), n,
+  tree.inverse_density(VertexDecision::light_sampling, buffer.view(), places.data(), n,
                        {grid[0].data(), grid[1].data(), grid[2].data()}, inv_q.data());
   std::array<double, 8> drawn{}, expected{};
   for (std::size_t i = 0; i < n; ++i) {
@@ -111,7 +112,7 @@ TEST(ConditionalKdTree, IsTheSameAfterSavingAndLoading) {
   TensorFile file;
   tree.save(file, "warp.");
   const auto loaded = ConditionalKdTree::load(file, "warp.");
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   for (const auto which : kBoth) {
     const Drawn a = draw(tree, which, vertices.view()), b = draw(*loaded, which, vertices.view());
     EXPECT_EQ(a.y, b.y);

@@ -54,7 +54,7 @@ ConditionalSpline::ConditionalSpline(std::shared_ptr<const Shape> shape, const V
 /// Some vertices on their way through a flow.
 class ConditionalSpline::Block {
  public:
-  Block(const ConditionalSpline& warp, VertexNumbers which)
+  Block(const ConditionalSpline& warp, VertexDecision which)
       : m_warp(warp), m_packed(warp.m_packed[static_cast<std::size_t>(which)]) {
     const spline::Flow& flow = warp.m_shape->flow;
     const auto floats = static_cast<std::size_t>(flow.context_rows()) * kBlock;
@@ -89,7 +89,7 @@ float ConditionalSpline::inverse_of(double log_q) const {
   return static_cast<float>(1 / ((1 - m_uniform) * std::exp(std::min(log_q, 80.0)) + m_uniform));
 }
 
-void ConditionalSpline::sample(VertexNumbers which, const VertexContext& context, const std::uint32_t*, std::size_t n,
+void ConditionalSpline::sample(VertexDecision which, const VertexContext& context, const std::uint32_t*, std::size_t n,
                                const std::array<const double*, 3>& z, const std::array<float*, 3>& y,
                                float* inv_q) const {
   // First those that the uniform share draws, whose density the flow tells; then those that go through it.
@@ -126,7 +126,7 @@ void ConditionalSpline::sample(VertexNumbers which, const VertexContext& context
   part(uniform, n, m_uniform, 1, true);
 }
 
-void ConditionalSpline::inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t*,
+void ConditionalSpline::inverse_density(VertexDecision which, const VertexContext& context, const std::uint32_t*,
                                         std::size_t n, const std::array<const float*, 3>& y, float* inv_q) const {
   Block block(*this, which);
   std::array<std::uint32_t, kBlock> indices;
@@ -159,7 +159,7 @@ std::shared_ptr<const ConditionalSpline> ConditionalSpline::load(const TensorFil
   const int position_bins = load_int(file, prefix, "position_bins", 0, 256);
   const int film_bins = load_int(file, prefix, "film_bins", 0, 256);
   auto shape = std::make_shared<const Shape>(load_spline_settings(file, prefix), position_bins, film_bins);
-  Layout numbers = load_vertex_numbers(file, prefix);
+  Layout numbers = load_decisions(file, prefix);
   const std::vector<float> place = file.get<float>(prefix + "box_and_uniform").values;
   const auto finite = [](float p) { return std::isfinite(p); };
   if (place.size() != 5 || !std::all_of(place.begin(), place.end(), finite) || !(place[4] >= 0 && place[4] < 1))

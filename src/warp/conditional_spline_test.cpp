@@ -7,7 +7,7 @@
 
 #include "core/rng.h"
 #include "core/tensor_file.h"
-#include "warp/vertex_warp_fixture.h"
+#include "warp/vertex_proposal_fixture.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -15,7 +15,7 @@ namespace {
 
 using test::draw, test::Drawn, test::kVertices;
 
-constexpr std::array kBoth{VertexNumbers::light, VertexNumbers::scatter};
+constexpr std::array kBoth{VertexDecision::light_sampling, VertexDecision::scattering};
 
 /// Flows of random weights.
 ConditionalSpline example(double uniform = 0.2, const Layout& numbers = Layout::parse("bounce1.lobe+bounce1")) {
@@ -34,7 +34,7 @@ ConditionalSpline example(double uniform = 0.2, const Layout& numbers = Layout::
 }
 
 TEST(ConditionalSpline, SamplesAndDensitiesAgree) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   for (const double uniform : {0.0, 0.2}) {
     const ConditionalSpline spline = example(uniform);
     for (const auto which : kBoth) {
@@ -58,15 +58,17 @@ TEST(ConditionalSpline, VerticesDoNotKnowOfEachOther) { test::expect_vertices_do
 
 TEST(ConditionalSpline, SeesTheFilm) {
   const ConditionalSpline spline = example();
-  VertexContextBuffer here, there;
-  VertexValues values{};
+  VertexBuffer here, there;
+  Vertex vertex;
+  vertex.kind = 1;
   for (std::size_t i = 0; i < kVertices; ++i) {
-    values[13] = 0.2f;
-    here.add(values, 1, 0);
-    values[13] = 0.7f;
-    there.add(values, 1, 0);
+    vertex.film[0] = 0.2f;
+    here.add(vertex);
+    vertex.film[0] = 0.7f;
+    there.add(vertex);
   }
-  const Drawn a = draw(spline, VertexNumbers::light, here.view()), b = draw(spline, VertexNumbers::light, there.view());
+  const Drawn a = draw(spline, VertexDecision::light_sampling, here.view()),
+              b = draw(spline, VertexDecision::light_sampling, there.view());
   EXPECT_NE(a.y, b.y);
 }
 
@@ -75,13 +77,13 @@ TEST(ConditionalSpline, IsTheSameAfterSavingAndLoading) {
   TensorFile file;
   spline.save(file, "warp.");
   const auto loaded = ConditionalSpline::load(file, "warp.");
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   for (const auto which : kBoth) {
     const Drawn a = draw(spline, which, vertices.view()), b = draw(*loaded, which, vertices.view());
     EXPECT_EQ(a.y, b.y);
     EXPECT_EQ(a.inv_q, b.inv_q);
     for (const std::uint16_t bounce : {1, 2, 3})
-      EXPECT_EQ(loaded->warps(which, bounce), bounce == (which == VertexNumbers::scatter ? 1 : 2));
+      EXPECT_EQ(loaded->warps(which, bounce), bounce == (which == VertexDecision::scattering ? 1 : 2));
   }
 }
 

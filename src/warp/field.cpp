@@ -50,17 +50,17 @@ Field::Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, s
   WARPATH_CHECK_EQ(m_scatter.size(), m_tree.cells() * m_grids.diffuse.stored());
 }
 
-const CumulativeProbability* Field::density(VertexNumbers which, std::uint32_t cell) const {
+const CumulativeProbability* Field::density(VertexDecision which, std::uint32_t cell) const {
   if (cell == FieldTree::kNoCell) return nullptr;
-  return which == VertexNumbers::light ? m_light.data() + cell * m_grids.light.stored()
-                                       : m_scatter.data() + cell * m_grids.diffuse.stored();
+  return which == VertexDecision::light_sampling ? m_light.data() + cell * m_grids.light.stored()
+                                                 : m_scatter.data() + cell * m_grids.diffuse.stored();
 }
 
 void Field::locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const {
   m_tree.find_cells(context, n, places);
 }
 
-void Field::sample(VertexNumbers which, const VertexContext&, const std::uint32_t* places, std::size_t n,
+void Field::sample(VertexDecision which, const VertexContext&, const std::uint32_t* places, std::size_t n,
                    const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const {
   constexpr std::size_t kBlock = 32;
   std::array<HalvingGrid::Walk, kBlock> walks;
@@ -91,7 +91,7 @@ void Field::sample(VertexNumbers which, const VertexContext&, const std::uint32_
   }
 }
 
-void Field::inverse_density(VertexNumbers which, const VertexContext&, const std::uint32_t* places, std::size_t n,
+void Field::inverse_density(VertexDecision which, const VertexContext&, const std::uint32_t* places, std::size_t n,
                             const std::array<const float*, 3>& y, float* inv_q) const {
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t cell = places[i];
@@ -169,7 +169,7 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
     const auto is_density = [&](const HalvingGrid& grid, const std::vector<CumulativeProbability>& all) {
       return grid.is_density(std::span(all).subspan(c * grid.stored(), grid.stored()));
     };
-    if (!is_density(grids.light, light) || !is_density(grids.grid(VertexNumbers::scatter, kinds[c]), scatter))
+    if (!is_density(grids.light, light) || !is_density(grids.grid(VertexDecision::scattering, kinds[c]), scatter))
       fail_load(file, prefix, "the probabilities of a cell do not add up");
   }
   const std::vector<float> stored = file.get<float>(prefix + "returns").values;
@@ -184,7 +184,7 @@ std::shared_ptr<const Field> Field::load(const TensorFile& file, const std::stri
         fail_load(file, prefix, "what returns to a cell is not a sensible number");
   }
   return std::make_shared<Field>(std::move(tree), std::move(grids), std::move(kinds), std::move(light),
-                                 std::move(scatter), std::move(returns), load_vertex_numbers(file, prefix));
+                                 std::move(scatter), std::move(returns), load_decisions(file, prefix));
 }
 
 }  // namespace warpath

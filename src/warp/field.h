@@ -4,7 +4,7 @@
 
 #include "warp/field_tree.h"
 #include "warp/halving_density.h"
-#include "warp/vertex_numbers.h"
+#include "warp/vertex_decision.h"
 
 namespace warpath {
 
@@ -12,11 +12,11 @@ namespace warpath {
 struct FieldGrids {
   /// light_parts: number of equally likely emitters; 1 if there is no choice among them.
   explicit FieldGrids(int light_parts);
-  const HalvingGrid& grid(VertexNumbers which, SurfaceKind kind) const {
-    return which == VertexNumbers::light  ? light
-           : kind == SurfaceKind::diffuse ? diffuse
-           : kind == SurfaceKind::delta   ? delta
-                                          : mixed;
+  const HalvingGrid& grid(VertexDecision which, SurfaceKind kind) const {
+    return which == VertexDecision::light_sampling ? light
+           : kind == SurfaceKind::diffuse          ? diffuse
+           : kind == SurfaceKind::delta            ? delta
+                                                   : mixed;
   }
   int light_parts;
   HalvingGrid light, diffuse, mixed, delta;
@@ -25,7 +25,7 @@ struct FieldGrids {
 /// A field of densities in world space: a FieldTree whose cells each hold a piecewise-constant density over the numbers
 /// of light sampling, and one over those of scattering. A vertex in no cell draws uniform numbers. Of one vertex alone
 /// it is a warp conditioned on what the path knows there: of the first, on what the film shows.
-class Field final : public VertexWarp {
+class Field final : public VertexProposal {
  public:
   /// What comes back to a vertex of a cell, by light sampling or through the direction that is scattered into.
   struct Return {
@@ -36,20 +36,20 @@ class Field final : public VertexWarp {
     Return light, scatter;
   };
   /// light, scatter: a density for each cell, see HalvingGrid; all scatter grids store as many numbers. numbers: those
-  /// that it draws, see check_vertex_numbers; empty for those of every vertex.
+  /// that it draws, see check_decisions; empty for those of every vertex.
   Field(FieldTree tree, FieldGrids grids, std::vector<SurfaceKind> kinds, std::vector<CumulativeProbability> light,
         std::vector<CumulativeProbability> scatter, std::vector<Returns> returns, Layout numbers = {});
 
   std::string family() const override { return "field"; }
-  bool warps(VertexNumbers which, std::uint16_t bounce) const override {
-    return holds_vertex_numbers(m_numbers, which, bounce);
+  bool warps(VertexDecision which, std::uint16_t bounce) const override {
+    return holds_decision(m_numbers, which, bounce);
   }
   const Layout& numbers() const { return m_numbers; }
   /// A place is a cell.
   void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;
-  void sample(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
+  void sample(VertexDecision which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override;
-  void inverse_density(VertexNumbers which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
+  void inverse_density(VertexDecision which, const VertexContext& context, const std::uint32_t* places, std::size_t n,
                        const std::array<const float*, 3>& y, float* inv_q) const override;
   bool expect_return(const std::uint32_t* places, std::size_t n, const float* inv_q, float* expected) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
@@ -60,11 +60,11 @@ class Field final : public VertexWarp {
   const FieldGrids& grids() const { return m_grids; }
 
   SurfaceKind kind(std::uint32_t cell) const { return m_kinds[cell]; }
-  const Return& returns(VertexNumbers which, std::uint32_t cell) const {
-    return which == VertexNumbers::light ? m_returns[cell].light : m_returns[cell].scatter;
+  const Return& returns(VertexDecision which, std::uint32_t cell) const {
+    return which == VertexDecision::light_sampling ? m_returns[cell].light : m_returns[cell].scatter;
   }
   /// The density of a cell; null for FieldTree::kNoCell.
-  const CumulativeProbability* density(VertexNumbers which, std::uint32_t cell) const;
+  const CumulativeProbability* density(VertexDecision which, std::uint32_t cell) const;
 
  private:
   FieldTree m_tree;

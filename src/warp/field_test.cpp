@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/tensor_file.h"
-#include "warp/vertex_warp_fixture.h"
+#include "warp/vertex_proposal_fixture.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -17,9 +17,9 @@ using test::draw, test::Drawn, test::kVertices;
 bool known(const VertexContext& vertices, std::size_t i) { return vertices.material[i] < test::kKnownMaterials; }
 
 TEST(Field, FindsTheCellsOfVertices) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   const Field field = test::random_field(vertices.view(), 3);
-  const Drawn drawn = draw(field, VertexNumbers::light, vertices.view());
+  const Drawn drawn = draw(field, VertexDecision::light_sampling, vertices.view());
   for (std::size_t i = 0; i < kVertices; ++i) {
     const auto cell =
         field.tree().cell(FieldTree::root_key(vertices.view(), i), FieldTree::features(vertices.view(), i));
@@ -29,10 +29,10 @@ TEST(Field, FindsTheCellsOfVertices) {
 }
 
 TEST(Field, SamplesAndDensitiesAgree) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   for (const int parts : {1, 3, 93, 1000}) {
     const Field field = test::random_field(vertices.view(), parts);
-    for (const auto which : {VertexNumbers::light, VertexNumbers::scatter}) {
+    for (const auto which : {VertexDecision::light_sampling, VertexDecision::scattering}) {
       const Drawn drawn = draw(field, which, vertices.view());
       std::size_t plain = 0;
       for (std::size_t i = 0; i < kVertices; ++i) {
@@ -55,9 +55,9 @@ std::vector<float> expected_returns(const Field& field, const Drawn& drawn) {
 }
 
 TEST(Field, WhatIsExpectedBackIsTheMeanOfTheCellOnAverage) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   const Field field = test::random_field(vertices.view(), 3);
-  const auto expected = expected_returns(field, draw(field, VertexNumbers::scatter, vertices.view()));
+  const auto expected = expected_returns(field, draw(field, VertexDecision::scattering, vertices.view()));
   double n = 0, sum = 0, square = 0;
   for (std::size_t i = 0; i < kVertices; ++i) {
     if (!known(vertices.view(), i)) {
@@ -73,16 +73,16 @@ TEST(Field, WhatIsExpectedBackIsTheMeanOfTheCellOnAverage) {
 }
 
 TEST(Field, IsTheSameAfterSavingAndLoading) {
-  const VertexContextBuffer vertices = test::random_vertices();
+  const VertexBuffer vertices = test::random_vertices();
   const Field field = test::random_field(vertices.view(), 5);
   TensorFile file;
   field.save(file, "warp.");
   const auto loaded = Field::load(file, "warp.");
-  for (const auto which : {VertexNumbers::light, VertexNumbers::scatter}) {
+  for (const auto which : {VertexDecision::light_sampling, VertexDecision::scattering}) {
     const Drawn a = draw(field, which, vertices.view()), b = draw(*loaded, which, vertices.view());
     EXPECT_EQ(a.y, b.y);
     EXPECT_EQ(a.inv_q, b.inv_q);
-    if (which == VertexNumbers::scatter) {
+    if (which == VertexDecision::scattering) {
       EXPECT_EQ(expected_returns(field, a), expected_returns(*loaded, b));
     }
   }

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 
 namespace warpath {
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "warpath/train.h"
+#include "train/settings.h"
 
 namespace warpath {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

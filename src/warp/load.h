@@ -3,7 +3,7 @@
 #include <string>
 
 #include "core/tensor_file.h"
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

@@ -2,7 +2,7 @@
 #include <array>
 #include <vector>
 
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 namespace warpath {
 

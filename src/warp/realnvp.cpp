@@ -53,7 +53,7 @@ void RealNvp::save(TensorFile& file, const std::string& prefix) const {
   meta[prefix + "width"] = std::to_string(s.width);
   meta[prefix + "blocks"] = std::to_string(s.blocks);
   meta[prefix + "shared"] = std::to_string(s.shared ? 1 : 0);
-  meta[prefix + "bins"] = std::to_string(s.bins);
+  meta[prefix + "bins"] = std::to_string(s.encoding_bins);
   meta[prefix + "masks"] = kMasks[static_cast<std::size_t>(s.masks)];
   meta[prefix + "norm"] = kNorms[static_cast<std::size_t>(s.norm)];
   save_parameters(file, prefix, m_flow, m_parameters);
@@ -66,7 +66,7 @@ std::shared_ptr<const RealNvp> RealNvp::load(const TensorFile& file, const std::
   s.width = load_int(file, prefix, "width", 16, 8192);
   s.blocks = load_int(file, prefix, "blocks", 0, 100);
   s.shared = load_int(file, prefix, "shared", 0, 1) == 1;
-  s.bins = load_int(file, prefix, "bins", 0, 256);
+  s.encoding_bins = load_int(file, prefix, "bins", 0, 256);
   s.masks = load_enum<RealNvpSettings::Masks>(file, prefix, "masks", kMasks);
   s.norm = load_enum<RealNvpSettings::Norm>(file, prefix, "norm", kNorms);
   if (s.width % 16 != 0) fail_load(file, prefix, fmt::format("width {}: not a multiple of 16", s.width));

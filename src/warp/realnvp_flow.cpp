@@ -34,7 +34,8 @@ const float* row(const float* rows, int r) { return rows + static_cast<std::size
 
 Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings(settings) {
   if (settings.couplings < 1) throw ConfigError(fmt::format("couplings {}: must be at least 1", settings.couplings));
-  if (settings.bins < 0) throw ConfigError(fmt::format("bins {}: must not be negative", settings.bins));
+  if (settings.encoding_bins < 0)
+    throw ConfigError(fmt::format("bins {}: must not be negative", settings.encoding_bins));
   WARPATH_CHECK(dims >= 1);
   for (int c = 0; c < settings.couplings; ++c) {
     Coupling coupling;
@@ -46,7 +47,7 @@ Flow::Flow(int dims, const RealNvpSettings& settings) : m_dims(dims), m_settings
       (moves[static_cast<std::size_t>(i) % moves.size()] ? coupling.moved : coupling.kept).push_back(i);
     const int kept = static_cast<int>(coupling.kept.size()), moved = static_cast<int>(coupling.moved.size());
     for (int n = 0; n < (settings.shared ? 1 : 2); ++n) {
-      nn::ResidualNet net(kept * encoded_rows(settings.bins), settings.width, settings.blocks,
+      nn::ResidualNet net(kept * encoded_rows(settings.encoding_bins), settings.width, settings.blocks,
                           settings.shared ? 2 * moved : moved, norm_of(settings.norm));
       coupling.parameters.push_back(std::exchange(m_parameters, m_parameters + net.parameter_count()));
       coupling.packed.push_back(std::exchange(m_packed, m_packed + net.packed_count()));
@@ -151,13 +152,14 @@ std::size_t Flow::scratch_count() const {
 
 void Flow::encode_kept(const Coupling& coupling, const float* v, float* x) const {
   for (std::size_t k = 0; k < coupling.kept.size(); ++k)
-    encode(m_settings.bins, row(v, coupling.kept[k]), row(x, static_cast<int>(k) * encoded_rows(m_settings.bins)));
+    encode(m_settings.encoding_bins, row(v, coupling.kept[k]),
+           row(x, static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)));
 }
 
 void Flow::encode_kept_backward(const Coupling& coupling, const float* v, const float* d_x, float* d_v) const {
   for (std::size_t k = 0; k < coupling.kept.size(); ++k)
-    encode_backward(m_settings.bins, row(v, coupling.kept[k]),
-                    row(d_x, static_cast<int>(k) * encoded_rows(m_settings.bins)), row(d_v, coupling.kept[k]));
+    encode_backward(m_settings.encoding_bins, row(v, coupling.kept[k]),
+                    row(d_x, static_cast<int>(k) * encoded_rows(m_settings.encoding_bins)), row(d_v, coupling.kept[k]));
 }
 
 void Flow::condition(const Coupling& coupling, const PackedParameters& packed, const float* v, float* x, float* scratch,

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "nn/residual_net.h"
+#include "train/settings.h"
 #include "warp/coupling_flow.h"
-#include "warpath/train.h"
 
 namespace warpath::realnvp {
 

@@ -59,7 +59,7 @@ class FlowTest : public testing::TestWithParam<Case> {
     s.blocks = 1;
     s.shared = c.shared;
     s.norm = c.norm;
-    s.bins = c.bins;
+    s.encoding_bins = c.bins;
     s.masks = c.dims == 4 ? RealNvpSettings::Masks::alternating : RealNvpSettings::Masks::binary;
     return s;
   }

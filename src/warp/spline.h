@@ -1,8 +1,8 @@
 #pragma once
 #include <memory>
 
+#include "warp/proposal.h"
 #include "warp/spline_flow.h"
-#include "warpath/warp.h"
 
 namespace warpath {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include "nn/residual_net.h"
+#include "train/settings.h"
 #include "warp/coupling_flow.h"
-#include "warpath/train.h"
 
 namespace warpath::spline {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/primary_source.h"
+#include "path/primary_source.h"
 
 namespace warpath {
 

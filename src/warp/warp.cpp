@@ -1,4 +1,4 @@
-#include "warpath/warp.h"
+#include "warp/proposal.h"
 
 #include "warp/scratch.h"
 

@@ -1,11 +1,10 @@
-#include "warpath/warp_file.h"
+#include "warp/warp_file.h"
 
 #include "core/tensor_file.h"
 #include "warp/conditional_kdtree.h"
 #include "warp/conditional_spline.h"
 #include "warp/field.h"
 #include "warp/load.h"
-#include "warp/neural.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -20,17 +19,17 @@ const std::string kSetting = "setting.";
 }  // namespace
 
 std::string family_of(const WarpFile& file) {
-  return file.proposal ? file.proposal->family() : file.vertex_warp->family();
+  return file.proposal ? file.proposal->family() : file.vertex_proposal->family();
 }
 
 void save_warp(const std::filesystem::path& path, const WarpFile& file) {
-  WARPATH_CHECK((file.proposal != nullptr) != (file.vertex_warp != nullptr));
+  WARPATH_CHECK((file.proposal != nullptr) != (file.vertex_proposal != nullptr));
   TensorFile tensors;
   if (file.proposal) {
     WARPATH_CHECK_EQ(file.proposal->dims(), file.layout.dims());
     file.proposal->save(tensors, kPrefix);
   } else {
-    file.vertex_warp->save(tensors, kPrefix);
+    file.vertex_proposal->save(tensors, kPrefix);
   }
   tensors.metadata()["format"] = kFormat;
   tensors.metadata()["family"] = family_of(file);
@@ -49,20 +48,16 @@ WarpFile load_warp(const std::filesystem::path& path) {
   WarpFile file;
   if (const std::string& family = tensors.meta(kPrefix + "family"); family == "field") {
     const auto field = Field::load(tensors, kPrefix);
-    file.vertex_warp = field;
+    file.vertex_proposal = field;
     file.layout = field->numbers();
   } else if (family == "conditional-kdtree") {
     const auto tree = ConditionalKdTree::load(tensors, kPrefix);
-    file.vertex_warp = tree;
+    file.vertex_proposal = tree;
     file.layout = tree->numbers();
   } else if (family == "conditional-spline") {
     const auto spline = ConditionalSpline::load(tensors, kPrefix);
-    file.vertex_warp = spline;
+    file.vertex_proposal = spline;
     file.layout = spline->numbers();
-  } else if (family == "neural") {
-    const auto neural = Neural::load(tensors, kPrefix);
-    file.vertex_warp = neural;
-    file.layout = neural->numbers();
   } else {
     try {
       file.layout = Layout::parse(tensors.meta("layout"));
