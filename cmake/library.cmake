@@ -2,7 +2,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(parts warpath_integrate warpath_train warpath_warp warpath_nn warpath_path warpath_core)
+set(parts warpath_integrate warpath_family warpath_train warpath_warp warpath_nn warpath_path warpath_core)
 list(TRANSFORM parts REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
 add_library(warpath_library SHARED ${objects})
 set_target_properties(warpath_library PROPERTIES OUTPUT_NAME warpath EXPORT_NAME warpath VERSION ${PROJECT_VERSION} SOVERSION 0)

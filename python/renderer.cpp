@@ -12,11 +12,11 @@
 
 #include "arrays.h"
 #include "core/log.h"
+#include "family/training_options.h"
 #include "render/method.h"
 #include "render/render_loop.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"
-#include "train/training_options.h"
 
 namespace warpath::python {
 namespace {

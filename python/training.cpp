@@ -18,10 +18,10 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "core/streams.h"
-#include "train/train.h"
-#include "train/training_options.h"
+#include "family/fit.h"
+#include "family/training_options.h"
+#include "family/warp_file.h"
 #include "warp/scratch.h"
-#include "warp/warp_file.h"
 
 namespace warpath::python {
 namespace {

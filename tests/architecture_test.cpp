@@ -22,13 +22,14 @@ const std::map<std::string, std::set<std::string>> kAllowed{
     {"nn", {"core"}},
     {"warp", {"nn", "path", "core"}},
     {"train", {"warp", "nn", "path", "core"}},
-    {"integrate", {"train", "warp", "integrand", "path", "core"}},
+    {"family", {"train", "warp", "nn", "path", "core"}},
+    {"integrate", {"family", "train", "warp", "integrand", "path", "core"}},
     {"estimate", {"warp", "integrand", "tracer", "scene", "path", "core"}},
-    {"render", {"estimate", "train", "warp", "integrand", "tracer", "scene", "path", "core"}},
+    {"render", {"estimate", "family", "train", "warp", "integrand", "tracer", "scene", "path", "core"}},
     {"report", {"path", "core"}},
     {"cli",
-     {"core", "path", "scene", "tracer", "integrand", "nn", "warp", "train", "integrate", "estimate", "render",
-      "report"}},
+     {"core", "path", "scene", "tracer", "integrand", "nn", "warp", "train", "family", "integrate", "estimate",
+      "render", "report"}},
 };
 
 bool is_code(const fs::path& path) { return path.extension() == ".h" || path.extension() == ".cpp"; }

@@ -9,11 +9,11 @@
 #include <memory>
 
 #include "estimate/image_estimator.h"
+#include "family/fit.h"
 #include "integrand/path_integrand.h"
 #include "scene/scene.h"
 #include "train/candidates.h"
 #include "train/field_learner.h"
-#include "train/train.h"
 
 namespace warpath {
 namespace {

@@ -9,10 +9,10 @@
 #include <functional>
 
 #include "estimate/image_estimator.h"
+#include "family/fit.h"
 #include "integrand/path_integrand.h"
 #include "render/method.h"
 #include "train/candidates.h"
-#include "train/train.h"
 
 namespace warpath {
 namespace {

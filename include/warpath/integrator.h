@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "warpath/batch.h"
-#include "warp/proposal.h"
 
 namespace warpath {
 

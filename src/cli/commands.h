@@ -5,40 +5,55 @@
 #include <variant>
 #include <vector>
 
-#include "cli/options.h"
+#include "family/training_options.h"
+#include "render/render_options.h"
 
 namespace warpath {
 
+/// Options of every command that change nothing in what it makes.
+struct ProcessOptions {
+  std::optional<int> threads;  ///< none: all
+  bool verbose = false, quiet = false;
+};
+
 struct RenderCommand {
-  CommonOptions common;
-  RenderOptions render;
-  TrainingOptions training;
-  std::string warp = "none";
+  ProcessOptions process;
+  SceneRequest scene;
+  RenderSettings render;
+  TrainingOptions training{TrainingOptions::Spelling::command_line};
+  std::string warp = kNoWarp;
   std::filesystem::path output = "out.exr";
+  std::string aov;               ///< albedo,normal,depth
+  std::filesystem::path replay;  ///< results.json whose runs are repeated
 };
 
 struct TrainCommand {
-  CommonOptions common;
-  TrainingOptions training;
+  ProcessOptions process;
+  SceneRequest scene;
+  std::uint64_t seed = 0;
+  TrainingOptions training{TrainingOptions::Spelling::command_line};
   std::string warp;
   std::filesystem::path output;
 };
 
 struct CompareCommand {
-  CommonOptions common;
-  RenderOptions render;
-  TrainingOptions training;
-  std::vector<std::string> methods{"none", "kdtree:film+bounce1", "realnvp:film+bounce1"};
+  ProcessOptions process;
+  SceneRequest scene;
+  RenderSettings render;
+  TrainingOptions training{TrainingOptions::Spelling::command_line};
+  std::vector<std::string> methods{kNoWarp, "kdtree:film+bounce1", "realnvp:film+bounce1"};
+  std::filesystem::path replay;
   int runs = 1;
-  std::filesystem::path reference;  ///< empty: rendered here
-  int reference_spp = 0;            ///< of the reference that is rendered here; 0: 8 x spp
-  std::filesystem::path directory;  ///< where images, results.json and index.html go
-  bool resume = false;              ///< runs that results.json there has already are kept
-  std::string typed;                ///< the whole command line
+  std::filesystem::path reference;   ///< empty: rendered here
+  std::optional<int> reference_spp;  ///< of the reference that is rendered here; none: 8 x spp
+  std::filesystem::path directory;   ///< where images, results.json and index.html go
+  bool resume = false;               ///< runs that results.json there has already are kept
+  std::string typed;                 ///< the whole command line
 };
 
 struct InspectCommand {
-  CommonOptions common;  ///< `scene` may be a warp file, too
+  ProcessOptions process;
+  SceneRequest scene;  ///< its file may be a warp, too
 };
 
 using Command = std::variant<RenderCommand, TrainCommand, CompareCommand, InspectCommand>;

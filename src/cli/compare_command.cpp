@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "cli/comparison.h"
+#include "cli/output.h"
 #include "core/log.h"
 #include "report/summary.h"
 #include "scene/scene.h"
@@ -9,10 +10,16 @@
 namespace warpath {
 
 void run(const CompareCommand& command) {
-  const Threads threads(command.common);
+  const Threads threads(command.process);
   std::vector<Method> methods;
   for (const std::string& text : command.methods) methods.push_back(parse_method(text));
-  const auto tracer = std::make_shared<Tracer>(load_scene(command.common, &command.render));
+  std::vector<std::string> families;
+  for (const Method& method : methods) {
+    check_sampler(command.render.sampler, method);
+    families.push_back(method.trained_family());
+  }
+  command.training.check_used(families);
+  const auto tracer = std::make_shared<const Tracer>(load_scene(command.scene));
   ComparisonRunner runner(tracer, command, std::move(methods));
   runner.run(threads.count());
   write_report(command.directory, runner.data());

@@ -7,9 +7,10 @@
 #include <sstream>
 #include <tuple>
 
+#include "cli/method_run.h"
+#include "cli/output.h"
 #include "cli/terminal.h"
 #include "core/interrupt.h"
-#include "core/log.h"
 #include "core/rng.h"
 #include "core/streams.h"
 #include "report/densities.h"
@@ -73,46 +74,37 @@ std::string without_resources(const std::string& command) {
   return rest;
 }
 
-/// MSE and relMSE that the image's own variance promises.
-std::pair<double, double> predicted_errors(const ImageEstimate& image, const ImageRgb& reference) {
-  double mse = 0, relmse = 0;
-  for (std::size_t p = 0; p < image.mean.size(); ++p)
-    for (int c = 0; c < 3; ++c) {
-      mse += image.variance[p][c];
-      relmse += image.variance[p][c] / (sqr(reference.pixels[p][c]) + 0.01);
-    }
-  const double count = 3 * static_cast<double>(image.mean.size());
-  return {mse / count, relmse / count};
-}
-
 }  // namespace
 
 ComparisonRunner::ComparisonRunner(std::shared_ptr<const Tracer> tracer, CompareCommand command,
                                    std::vector<Method> methods)
-    : m_tracer(std::move(tracer)), m_command(std::move(command)), m_methods(std::move(methods)) {}
+    : m_command(std::move(command)),
+      m_renderer(std::move(tracer), terminal_stages(m_command.process.quiet)),
+      m_methods(std::move(methods)) {}
 
-void ComparisonRunner::run(int threads) {
-  const Scene& scene = m_tracer->scene();
+void ComparisonRunner::describe_comparison(int threads) {
   Comparison& c = m_data.comparison;
-  c.scene = m_command.common.scene.string();
+  c.scene = m_command.scene.file.string();
   c.version = WARPATH_VERSION;
   c.commit = WARPATH_COMMIT;
   c.cpu = cpu_name();
   c.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
   c.command = m_command.typed;
-  c.width = scene.film.crop_width;
-  c.height = scene.film.crop_height;
+  c.width = film().crop_width;
+  c.height = film().crop_height;
   c.threads = threads;
-  c.seed = m_command.common.seed;
-  c.settings["sampler"] = m_command.render.sampler_name.value_or("independent");
-  c.settings["max_depth"] = std::to_string(scene.integrator.max_depth);
+  c.seed = m_command.render.seed;
+  c.settings["sampler"] = sampler_name(m_command.render.sampler);
+  c.settings["max_depth"] = std::to_string(m_renderer.tracer().scene().integrator.max_depth);
+}
 
+void ComparisonRunner::run(int threads) {
+  Comparison& c = m_data.comparison;
+  describe_comparison(threads);
   // What is wrong is said before any work.
-  if (!m_command.render.replay.empty()) m_replay.emplace(m_command.render.replay);
-  for (const Method& method : m_methods) {
-    m_command.render.sampler(method.layout);
-    for (int run = 0; run < m_command.runs; ++run) replayed(method, c.seed + static_cast<std::uint64_t>(run));
-  }
+  if (!m_command.replay.empty()) m_replay.emplace(m_command.replay);
+  for (const Method& method : m_methods)
+    for (int run = 0; run < m_command.runs; ++run) settings_of(method, c.seed + static_cast<std::uint64_t>(run));
 
   prepare_reference();
   m_data.reference = m_reference.image;
@@ -141,14 +133,13 @@ void ComparisonRunner::run(int threads) {
 }
 
 void ComparisonRunner::prepare_reference() {
-  const FilmSettings& film = m_tracer->scene().film;
-  const std::uint64_t seed = mix64(m_command.common.seed ^ kReferenceStream);
-  ImageEstimator estimator(*m_tracer, {}, nullptr, seed);
+  // It must not share a random number with what it judges.
+  const std::uint64_t seed = mix64(m_command.render.seed ^ kReferenceStream);
+  ImageEstimator estimator(m_renderer.tracer(), {}, nullptr, seed);
   if (m_command.reference.empty()) {
-    const int spp = m_command.reference_spp > 0
-                        ? m_command.reference_spp
-                        : kReferenceFactor * m_command.render.spp.value_or(m_tracer->scene().sample_count);
-    StageProgress progress(fmt::format("reference, {} spp", spp), m_command.common.quiet);
+    const int samples = m_command.render.spp.value_or(m_renderer.tracer().scene().sample_count);
+    const int spp = m_command.reference_spp.value_or(kReferenceFactor * samples);
+    StageProgress progress(fmt::format("reference, {} spp", spp), m_command.process.quiet);
     estimator.add_pass(spp, progress.callback());
     if (g_interrupted) throw Interrupted{};
     const ImageEstimate image = estimator.develop();
@@ -158,7 +149,7 @@ void ComparisonRunner::prepare_reference() {
     write_image(m_reference.path, image_file(image));
     return;
   }
-  m_reference = read_reference(m_command.reference, film.crop_width, film.crop_height);
+  m_reference = read_reference(m_command.reference, film().crop_width, film().crop_height);
   // What is left of the given reference without what the camera sees emitted directly.
   constexpr int kEmissionSpp = 256;
   estimator.add_emission_pass(kEmissionSpp);
@@ -178,11 +169,11 @@ void ComparisonRunner::take_finished_runs() {
   if (without_resources(before.command) != without_resources(c.command))
     throw ConfigError(fmt::format("--resume: {} was left by another command: {}", file.string(), before.command));
   if (before.commit != c.commit) c.warnings.push_back(fmt::format("some runs are of commit {}", before.commit));
-  const RenderOptions& render = m_command.render;
   const auto is_whole = [&](const Method& method, const MethodRun& run) {
-    if (m_replay) return run.passes.size() == replayed(method, run.seed).size();
-    if (render.time) return run.total_seconds > 0.9 * *render.time;
-    return run.spp > render.spp.value_or(m_tracer->scene().sample_count) - 0.5;
+    const RenderSettings settings = settings_of(method, run.seed);
+    if (!settings.replay.empty()) return run.passes.size() == settings.replay.size();
+    if (settings.time) return run.total_seconds > 0.9 * *settings.time;
+    return run.spp > settings.spp.value_or(m_renderer.tracer().scene().sample_count) - 0.5;
   };
   for (const Method& method : m_methods) {
     const auto image = m_command.directory / (file_name(method.name) + ".exr");
@@ -205,97 +196,38 @@ bool ComparisonRunner::has_run(const Method& method, int run) const {
                      [&](const MethodRun& r) { return r.method == method.name && r.seed == seed; });
 }
 
-std::vector<PassRecord> ComparisonRunner::replayed(const Method& method, std::uint64_t seed) const {
-  if (!m_replay) return {};
-  return m_replay->passes(method.name, seed, size_name(m_tracer->scene().film));
+RenderSettings ComparisonRunner::settings_of(const Method& method, std::uint64_t seed) const {
+  RenderSettings settings = m_command.render;
+  settings.seed = seed;
+  if (m_replay) settings.replay = m_replay->passes(method.name, seed, size_name(film()));
+  return settings;
 }
 
 MethodRun ComparisonRunner::run_method(const Method& method, int run) {
-  const std::uint64_t seed = m_command.common.seed + static_cast<std::uint64_t>(run);
-  const auto clock = start_clock();
-  Budget budget = make_budget(m_command.render, m_tracer->scene().sample_count);
-  budget.replay = replayed(method, seed);
-  // Candidates are shared by the methods of a run: what they cost counts for each of them.
-  auto& trainer = m_trainers[run];
-  if (!trainer)
-    trainer = std::make_unique<MethodTrainer>(m_tracer, m_command.training.train_settings(seed),
-                                              m_command.training.init, m_command.training.use_samples(),
-                                              m_command.render.objective(), terminal_stages(m_command.common.quiet));
-  PreparedMethod prepared = trainer->prepare(method);
-  const double prepare_seconds = prepared.candidate_seconds + prepared.log.seconds;
-  const double prepare_cpu_seconds = prepared.candidate_cpu_seconds + prepared.log.cpu_seconds;
+  const std::uint64_t seed = m_command.render.seed + static_cast<std::uint64_t>(run);
+  const RenderSettings settings = settings_of(method, seed);
+  std::vector<ErrorPoint> curve;
+  const Rendered rendered =
+      m_renderer.render(method, settings, m_command.training.settings(seed),
+                        fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
+                        [&](const Rendered& so_far) { curve.push_back(error_point(so_far, m_reference)); });
 
-  MethodRun result;
-  result.method = method.name;
-  result.family = method.family;
-  result.dims = method.layout.name();
-  result.size = size_name(m_tracer->scene().film);
-  result.seed = seed;
-  result.candidate_seconds = prepared.candidate_seconds;
-  result.train_seconds = prepared.log.seconds;
-  result.training_stopped = prepared.log.stopped;
-  for (const auto& p : prepared.log.points)
-    result.training_curve.push_back({p.seconds, p.samples, p.loss, p.held_out, p.cpu_seconds});
-  if (prepared.candidates) {
-    const auto& target = prepared.candidates->target;
-    result.candidates = result.train_samples = prepared.candidate_count;
-    result.candidates_nonzero =
-        static_cast<double>(std::count_if(target.begin(), target.end(), [](float g) { return g > 0; })) /
-        static_cast<double>(target.size());
-  }
-
-  ImageEstimator estimator(*m_tracer, method.layout, prepared.proposal, seed, m_command.render.sampler(method.layout));
-  {
-    prepared.add_candidates(estimator);
-    StageProgress progress(fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
-                           m_command.common.quiet);
-    auto passes = render_passes(estimator, budget, prepared.guide, progress.callback(), [&] {
-      const ImageErrors errors = image_errors(image_rgb(estimator.develop()), m_reference);
-      result.error_curve.push_back(
-          {estimator.spp(), prepare_seconds + prepared.guide.fit_seconds + estimator.cost().total(), errors.mse,
-           errors.relmse, prepare_cpu_seconds + prepared.guide.fit_cpu_seconds + estimator.cost().cpu_total()});
-    });
-    if (budget.by_clock()) result.passes = std::move(passes);
-  }
-  if (estimator.cost().samples == 0) throw Interrupted{};
-
-  const RenderCost& cost = estimator.cost();
-  result.spp = estimator.spp();
-  result.samples = cost.samples;
-  result.warp_seconds = cost.warp_seconds;
-  result.trace_seconds = cost.trace_seconds + cost.emission_seconds;
-  result.train_seconds += prepared.guide.fit_seconds;
-  if (!prepared.guide.choice.empty()) result.training_stopped = prepared.guide.choice;
-  result.train_samples += prepared.guide.taught;
-  result.total_seconds = prepare_seconds + prepared.guide.fit_seconds + cost.total();
-  result.candidate_cpu_seconds = prepared.candidate_cpu_seconds;
-  result.train_cpu_seconds = prepared.log.cpu_seconds + prepared.guide.fit_cpu_seconds;
-  result.warp_cpu_seconds = cost.warp_cpu_seconds;
-  result.trace_cpu_seconds = cost.trace_cpu_seconds;
-  result.total_cpu_seconds = prepare_cpu_seconds + prepared.guide.fit_cpu_seconds + cost.cpu_total();
-  result.non_finite = estimator.non_finite();
-  const ImageEstimate image = estimator.develop();
-  const ImageRgb rest = image_rgb(estimator.develop_rest());
-  result.set_errors(image_errors(image_rgb(image), m_reference));
-  std::tie(result.mse_predicted, result.relmse_predicted) = predicted_errors(image, m_reference.image);
-  const ImageErrors rest_errors = image_errors(rest, m_reference_rest);
-  result.mse_rest = rest_errors.mse;
-  result.relmse_rest = rest_errors.relmse;
-  result.mean = image_mean(image_rgb(image));
-  result.mean_rest = image_mean(rest);
-  log::debug("{}: {:.1f} s in all", method.name, clock());
-
+  MethodRun result = method_run(method, settings, rendered);
+  result.size = size_name(film());
+  result.error_curve = std::move(curve);
+  const ImageEstimate image = rendered.estimator->develop();
+  set_errors(result, image, image_rgb(rendered.estimator->develop_rest()), m_reference, m_reference_rest);
   if (run == 0) {
     m_data.images.push_back({method.name, image_rgb(image)});
     ImageFile file = image_file(image);
-    describe(file, *m_tracer, method, m_command.common, estimator, result.total_seconds);
+    describe(file, m_renderer.tracer(), method, m_command.render.seed, *rendered.estimator, result.total_seconds);
     write_image(m_command.directory / (file_name(method.name) + ".exr"), file);
-    keep_densities(method, prepared);
+    keep_densities(method, rendered.preparation);
   }
   return result;
 }
 
-void ComparisonRunner::keep_densities(const Method& method, const PreparedMethod& prepared) {
+void ComparisonRunner::keep_densities(const Method& method, const Preparation& prepared) {
   if (!prepared.candidates || !prepared.proposal) return;
   constexpr int kBins = 64;
   constexpr std::uint64_t kSamples = 1 << 20;

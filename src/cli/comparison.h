@@ -1,13 +1,11 @@
 #pragma once
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "cli/commands.h"
-#include "cli/output.h"
 #include "cli/replay.h"
-#include "render/method.h"
+#include "render/renderer.h"
 #include "report/html.h"
 
 namespace warpath {
@@ -23,21 +21,23 @@ class ComparisonRunner {
   const ReportData& data() const { return m_data; }
 
  private:
+  const FilmSettings& film() const { return m_renderer.tracer().scene().film; }
+  /// What the report says of the comparison as a whole.
+  void describe_comparison(int threads);
   void prepare_reference();
   /// Takes over the runs of an interrupted call of the same command, with their images.
   void take_finished_runs();
   bool has_run(const Method& method, int run) const;
-  /// The passes that are to be replayed; none without --replay. Throws ConfigError.
-  std::vector<PassRecord> replayed(const Method& method, std::uint64_t seed) const;
+  /// Of the run-th run of a method. Throws ConfigError where there is nothing to replay.
+  RenderSettings settings_of(const Method& method, std::uint64_t seed) const;
   MethodRun run_method(const Method& method, int run);
-  void keep_densities(const Method& method, const PreparedMethod& prepared);
+  void keep_densities(const Method& method, const Preparation& preparation);
 
-  std::shared_ptr<const Tracer> m_tracer;
   CompareCommand m_command;
+  Renderer m_renderer;
   std::vector<Method> m_methods;
   std::optional<Replay> m_replay;  // read before results.json is written, which may be the same file
   Reference m_reference, m_reference_rest;
-  std::map<int, std::unique_ptr<MethodTrainer>> m_trainers;  // by run
   ReportData m_data;
 };
 

@@ -2,8 +2,8 @@
 
 #include "cli/commands.h"
 #include "core/tensor_file.h"
+#include "family/warp_file.h"
 #include "scene/scene.h"
-#include "warp/warp_file.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -24,8 +24,8 @@ void inspect_warp(const std::filesystem::path& path) {
     fmt::print("  {:<40} {} {}\n", name, tensor.dtype, fmt::format("[{}]", fmt::join(tensor.shape, ", ")));
 }
 
-void inspect_scene(const CommonOptions& common) {
-  const Scene scene = load_scene(common, nullptr);
+void inspect_scene(const SceneRequest& request) {
+  const Scene scene = load_scene(request);
   std::size_t triangles = 0, meshes = 0;
   for (const Shape& shape : scene.shapes)
     if (const Mesh* mesh = std::get_if<Mesh>(&shape.geometry)) {
@@ -52,10 +52,10 @@ void inspect_scene(const CommonOptions& common) {
 }  // namespace
 
 void run(const InspectCommand& command) {
-  if (command.common.scene.extension() == ".xml")
-    inspect_scene(command.common);
+  if (command.scene.file.extension() == ".xml")
+    inspect_scene(command.scene);
   else
-    inspect_warp(command.common.scene);
+    inspect_warp(command.scene.file);
 }
 
 }  // namespace warpath

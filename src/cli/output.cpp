@@ -12,29 +12,14 @@
 
 namespace warpath {
 
-Threads::Threads(const CommonOptions& common)
-    : m_count(common.threads > 0 ? common.threads : tbb::this_task_arena::max_concurrency()),
+Threads::Threads(const ProcessOptions& options)
+    : m_count(options.threads.value_or(tbb::this_task_arena::max_concurrency())),
       m_control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(m_count)) {
-  if (common.quiet) spdlog::set_level(spdlog::level::warn);
-  if (common.verbose) spdlog::set_level(spdlog::level::debug);
-}
-
-std::function<double()> start_clock() {
-  const auto start = std::chrono::steady_clock::now();
-  return [start] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  if (options.quiet) spdlog::set_level(spdlog::level::warn);
+  if (options.verbose) spdlog::set_level(spdlog::level::debug);
 }
 
 std::string size_name(const FilmSettings& film) { return fmt::format("{}x{}", film.crop_width, film.crop_height); }
-
-Budget make_budget(const RenderOptions& options, int scene_spp) {
-  Budget budget;
-  budget.spp = options.spp.value_or(scene_spp);
-  if (options.time)
-    budget.deadline =
-        std::chrono::steady_clock::now() +
-        std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(*options.time));
-  return budget;
-}
 
 std::vector<Aov> parse_aovs(const std::string& list) {
   constexpr std::array<std::string_view, 3> kNames{"albedo", "normal", "depth"};
@@ -67,7 +52,7 @@ ImageFile image_file(const ImageEstimate& estimate) {
   return file;
 }
 
-void describe(ImageFile& file, const Tracer& tracer, const Method& method, const CommonOptions& common,
+void describe(ImageFile& file, const Tracer& tracer, const Method& method, std::uint64_t seed,
               const ImageEstimator& estimator, double seconds) {
   auto& attributes = file.attributes;
   attributes["warpath:version"] = std::string(WARPATH_VERSION);
@@ -75,7 +60,7 @@ void describe(ImageFile& file, const Tracer& tracer, const Method& method, const
   attributes["warpath:method"] = method.name;
   attributes["warpath:dims"] = method.layout.name();
   attributes["warpath:sampler"] = std::string(sampler_name(estimator.sampler()));
-  attributes["warpath:seed"] = std::to_string(common.seed);
+  attributes["warpath:seed"] = std::to_string(seed);
   attributes["warpath:spp"] = static_cast<float>(estimator.spp());
   attributes["warpath:max_depth"] = tracer.scene().integrator.max_depth;
   attributes["warpath:seconds"] = static_cast<float>(seconds);

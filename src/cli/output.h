@@ -1,14 +1,12 @@
 #pragma once
 #include <tbb/global_control.h>
 
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "cli/options.h"
+#include "cli/commands.h"
 #include "estimate/image_estimator.h"
 #include "render/method.h"
-#include "render/render_loop.h"
 #include "report/image.h"
 
 namespace warpath {
@@ -16,7 +14,7 @@ namespace warpath {
 /// While it lives, no more threads than --threads asks for are used, and messages are as loud as --verbose or --quiet.
 class Threads {
  public:
-  explicit Threads(const CommonOptions& common);
+  explicit Threads(const ProcessOptions& options);
   int count() const { return m_count; }
 
  private:
@@ -24,10 +22,6 @@ class Threads {
   tbb::global_control m_control;
 };
 
-/// A clock that starts now; a call tells the seconds since.
-std::function<double()> start_clock();
-/// The budget of the options; `scene_spp` where they say nothing. Time runs from now.
-Budget make_budget(const RenderOptions& options, int scene_spp);
 /// Of the film, or its part that is rendered: WxH.
 std::string size_name(const FilmSettings& film);
 
@@ -39,7 +33,7 @@ ImageRgb image_rgb(const ImageEstimate& estimate);
 /// Mean, with `variance.R`, `.G`, `.B` (of the mean) and `samples.Y`.
 ImageFile image_file(const ImageEstimate& estimate);
 /// Attributes that say how the image was made.
-void describe(ImageFile& file, const Tracer& tracer, const Method& method, const CommonOptions& common,
+void describe(ImageFile& file, const Tracer& tracer, const Method& method, std::uint64_t seed,
               const ImageEstimator& estimator, double seconds);
 /// Renders the layers with 16 camera rays a pixel.
 void add_aovs(ImageFile& file, const Tracer& tracer, const std::vector<Aov>& aovs, std::uint64_t seed);

@@ -5,52 +5,44 @@
 #include "cli/replay.h"
 #include "cli/terminal.h"
 #include "core/log.h"
-#include "render/method.h"
-#include "render/render_loop.h"
+#include "core/stopwatch.h"
+#include "render/renderer.h"
 #include "scene/scene.h"
-#include "warpath/error.h"
 
 namespace warpath {
+
 void run(const RenderCommand& command) {
-  const CommonOptions& common = command.common;
-  const Threads threads(common);
+  const Threads threads(command.process);
   check_image_name(command.output);
   const Method method = parse_method(command.warp);
-  const Sampler sampler = command.render.sampler(method.layout);
-  const std::vector<Aov> aovs = parse_aovs(command.render.aov);
-  const auto tracer = std::make_shared<const Tracer>(load_scene(common, &command.render));
-  Budget budget = make_budget(command.render, tracer->scene().sample_count);
-  if (!command.render.replay.empty())
-    budget.replay = Replay(command.render.replay).passes(method.name, common.seed, size_name(tracer->scene().film));
-  const auto clock = start_clock();
+  check_sampler(command.render.sampler, method);
+  command.training.check_used({method.trained_family()});
+  const std::vector<Aov> aovs = parse_aovs(command.aov);
+  Renderer renderer(std::make_shared<const Tracer>(load_scene(command.scene)), terminal_stages(command.process.quiet));
+  RenderSettings settings = command.render;
+  if (!command.replay.empty())
+    settings.replay =
+        Replay(command.replay).passes(method.name, settings.seed, size_name(renderer.tracer().scene().film));
+  const Stopwatch clock;
+  Rendered rendered =
+      renderer.render(method, settings, command.training.settings(settings.seed), "rendering " + method.name);
 
-  const TrainingOptions& training = command.training;
-  MethodTrainer trainer(tracer, training.train_settings(common.seed), training.init, training.use_samples(),
-                        command.render.objective(), terminal_stages(common.quiet));
-  PreparedMethod prepared = trainer.prepare(method);
-  auto estimator = std::make_unique<ImageEstimator>(*tracer, method.layout, prepared.proposal, common.seed, sampler);
-  {
-    prepared.add_candidates(*estimator);
-    StageProgress progress(fmt::format("rendering {}", method.name), common.quiet);
-    render_passes(*estimator, budget, prepared.guide, progress.callback(), [] {});
-  }
+  const auto& estimator = rendered.estimator;
   const std::uint64_t samples = estimator->cost().samples, non_finite = estimator->non_finite();
   const double spp = estimator->spp();
-  if (samples == 0) throw Interrupted{};
-
   ImageFile file;
   {
     ImageFile about;
-    describe(about, *tracer, method, common, *estimator, clock());
+    describe(about, renderer.tracer(), method, settings.seed, *estimator, clock.wall());
     const ImageEstimate image = estimator->take();
-    estimator.reset();  // sums of a large film take more memory than anything that follows
+    rendered.estimator.reset();  // sums of a large film take more memory than anything that follows
     file = image_file(image);
     file.attributes = std::move(about.attributes);
   }
-  add_aovs(file, *tracer, aovs, common.seed);
+  add_aovs(file, renderer.tracer(), aovs, settings.seed);
   write_image(command.output, file);
   if (non_finite > 0) log::warn("{} of {} samples were not finite; they count as 0", non_finite, samples);
-  log::info("{}: {} samples, {:.1f} per pixel, {:.1f} s", command.output.string(), samples, spp, clock());
+  log::info("{}: {} samples, {:.1f} per pixel, {:.1f} s", command.output.string(), samples, spp, clock.wall());
 }
 
 }  // namespace warpath

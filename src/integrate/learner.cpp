@@ -1,38 +1,28 @@
 #include "integrate/learner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "core/log.h"
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "family/family.h"
 #include "train/fit_grid.h"
-#include "train/fit_kdtree.h"
-#include "train/fit_realnvp.h"
-#include "train/fit_spline.h"
 #include "train/tempering.h"
 #include "warp/chain.h"
-#include "warp/kdtree.h"
-#include "warp/load.h"
 #include "warp/mixture.h"
-#include "warp/realnvp.h"
-#include "warp/spline.h"
 #include "warp/uniform.h"
 #include "warpath/error.h"
 
 namespace warpath {
 namespace {
 
-constexpr std::string_view kGridSpline = "grid+spline";
-constexpr std::array<std::string_view, 7> kFamilies{"auto",    "uniform", "grid",     "kdtree",
-                                                    "realnvp", "spline",  kGridSpline};
+// Names beside those of the families: a grid, and a spline flow in front of it where that pays, or in any case.
+constexpr char kAuto[] = "auto", kGridSpline[] = "grid+spline";
+constexpr char kGrid[] = "grid", kFront[] = "spline";
 
-constexpr int kMostFlowDims = 32;
 constexpr double kEnough = 2000;      // effective samples that a warp can learn from without annealing
 constexpr double kEnoughShare = 0.2;  // or that share of all
 constexpr double kWorse = 4;          // iterations with so much larger a variance than the best are not learned from
-constexpr int kEpochs = 4;
 // A grid that leaves this share of effective samples is good enough: scrambled points do the rest.
 constexpr double kGoodGrid = 0.75;
 // Intervals are halved where an average one has so many effective samples, as far as they go; more where there are more
@@ -47,20 +37,34 @@ constexpr int kFlowTries = 3;         // times that a flow may be trained withou
 
 double enough_of(double examples) { return std::min(kEnough, kEnoughShare * examples); }
 
-bool is_flow(const std::string& family) { return family == "spline" || family == "realnvp" || family == kGridSpline; }
+/// Whether a family can be fitted to the points of iterations.
+bool can_adapt(const Family& family) {
+  return family.joint() && (family.joint()->adapt || !family.learns() || family.name == kGrid);
+}
+
+/// Throws ConfigError for a name that is unknown.
+const JointFamily& family_of_name(const std::string& name) {
+  const Family* family = find_family(name == kAuto ? kGrid : name == kGridSpline ? kFront : name);
+  if (family && can_adapt(*family)) return *family->joint();
+  std::vector<std::string> names = family_names(can_adapt);
+  names.insert(names.begin(), kAuto);
+  names.emplace_back(kGridSpline);
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  throw ConfigError(fmt::format("unknown warp \"{}\";{}", name, suggestion(name, known)));
+}
 
 }  // namespace
 
 Learner::Learner(int dims, const std::string& family, std::uint64_t seed, std::size_t memory)
     : m_dims(dims), m_family(family), m_seed(seed), m_memory(memory) {
-  if (std::find(kFamilies.begin(), kFamilies.end(), family) == kFamilies.end())
-    throw ConfigError(fmt::format("unknown warp \"{}\";{}", family, suggestion(family, kFamilies)));
-  const int most = is_flow(family) ? kMostFlowDims : family == "kdtree" ? KdTree::kMaxDims : kMaxDims;
-  if (dims < 1 || dims > most)
-    throw ConfigError(fmt::format("{} dimensions; the warp \"{}\" has 1 to {}", dims, family, most));
-  if (family == "auto" || family == "grid" || family == kGridSpline)
-    m_grid = std::make_shared<const Grid>(dims, GridSettings().bins);
+  const JointFamily& joint = family_of_name(family);
+  if (dims < 1 || dims > joint.most_dims)
+    throw ConfigError(fmt::format("{} dimensions; the warp \"{}\" has 1 to {}", dims, family, joint.most_dims));
+  if (has_front() || family == kGrid) m_grid = std::make_shared<const Grid>(dims, GridSettings().bins);
+  m_adapts = has_front() ? find_family(kFront)->joint() : &joint;
 }
+
+bool Learner::has_front() const { return m_family == kAuto || m_family == kGridSpline; }
 
 void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
   const auto refuse = [&] {
@@ -76,7 +80,7 @@ void Learner::start_from(std::shared_ptr<const Proposal> proposal) {
     m_grid = std::dynamic_pointer_cast<const Grid>(chain->outer());
     m_warp = chain->inner();
     m_grid_done = true;
-    if (!m_grid || (m_family != "auto" && m_family != kGridSpline)) refuse();
+    if (!m_grid || !has_front()) refuse();
   } else if (auto grid = std::dynamic_pointer_cast<const Grid>(warp)) {
     if (!m_grid) refuse();
     m_grid = std::move(grid);
@@ -113,13 +117,13 @@ std::string Learner::description() const {
 }
 
 void Learner::learn(Examples examples, double variance) {
-  if (m_family == "uniform") return;
+  if (!m_grid && !m_adapts->adapt) return;
   (defended() ? m_warp_variance : m_grid_variance) = variance;
   const double effective = effective_samples(examples.weight);
   if (effective == 0) return;  // nothing was seen; what there is draws again
   ++m_learned;
   const double count = static_cast<double>(examples.size()), share = effective / count;
-  if (m_family == "auto" || m_family == kGridSpline) m_grid_done = grid_is_done(examples, share);
+  if (has_front()) m_grid_done = grid_is_done(examples, share);
   const bool trained = m_flows > 0 && defended() && share < kFlowGain * m_passes.back().effective_share;
   remember(std::move(examples), share);
 
@@ -129,12 +133,10 @@ void Learner::learn(Examples examples, double variance) {
   const bool of_grid = m_grid && !m_grid_done;
   const std::size_t most = of_grid ? kMostGridNumbers / static_cast<std::size_t>(m_dims) : m_memory;
   Examples chosen = annealing ? tempered(m_passes.back().examples, enough) : pooled(most);
-  if (m_family == "kdtree") {
-    learn_tree(std::move(chosen), annealing);
-  } else if (of_grid) {
+  if (of_grid) {
     learn_grid(chosen, annealing);
   } else if (!m_grid || defended() || m_flows < kFlowTries) {
-    learn_flow(std::move(chosen), annealing);
+    learn_warp(std::move(chosen), annealing);
   }
 }
 
@@ -147,7 +149,7 @@ void Learner::remember(Examples examples, double effective_share) {
 
 // A grid has done what it can when an iteration that it drew is hardly better than the one before.
 bool Learner::grid_is_done(const Examples& examples, double effective_share) const {
-  if (m_dims > kMostFlowDims) return false;
+  if (m_dims > m_adapts->most_dims) return false;
   if (m_grid_done || m_passes.empty()) return m_grid_done;
   if (effective_share > kGoodGrid) return m_family == kGridSpline;
   const Pass& last = m_passes.back();
@@ -196,39 +198,13 @@ void Learner::learn_grid(const Examples& examples, bool tempered) {
   m_grid = fit_grid(examples, settings, m_grid.get());
 }
 
-void Learner::learn_tree(Examples examples, bool tempered) {
-  KdTreeSettings settings;
-  if (!tempered) settings.target = KdTreeSettings::Target::second_moment;
-  m_warp = fit_kdtree(std::move(examples), settings);
-}
-
-void Learner::learn_flow(Examples examples, bool tempered) {
+void Learner::learn_warp(Examples examples, bool tempered) {
   if (m_grid) examples = behind_grid(std::move(examples));
-  const auto train = [&](auto settings, const auto& fit) {
-    settings.loss = tempered ? FlowTraining::Loss::likelihood : FlowTraining::Loss::variance;
-    settings.uniform = 0.05;
-    settings.average = 0.99;
-    settings.max_steps =
-        std::max(200, static_cast<int>(kEpochs * examples.size() / static_cast<std::size_t>(settings.batch)));
-    const Fit result =
-        fit(ExampleSet(examples), settings, sample_key(m_seed, static_cast<std::uint64_t>(++m_flows)), m_warp.get());
-    m_warp = std::dynamic_pointer_cast<const Warp>(result.proposal);
-    m_trained += result.log.points.back().samples;
-    log::debug("flow: {} examples, loss {:.4g}, {}", examples.size(), result.log.points.back().held_out,
-               result.log.stopped);
-  };
-  if (m_family == "realnvp") return train(RealNvpSettings(), fit_realnvp);
-  SplineSettings settings;
-  settings.masks = SplineSettings::Masks::autoregressive;
-  if (m_dims <= 3) {  // several passes over few numbers, finely encoded, each by a small network
-    settings.couplings = 3;
-    settings.blocks = 0;
-    settings.encoding_bins = 31;  // with the number itself 32 inputs, which fill the kernels
-  } else {
-    settings.couplings = 1;
-    settings.encoding_bins = 8;
-  }
-  train(settings, fit_spline);
+  if (m_adapts->is_flow) ++m_flows;
+  const std::uint64_t seed = sample_key(m_seed, static_cast<std::uint64_t>(m_flows));
+  auto adapted = m_adapts->adapt(std::move(examples), tempered, seed, m_warp.get());
+  m_warp = std::move(adapted.warp);
+  m_trained += adapted.trained;
 }
 
 Examples Learner::behind_grid(Examples examples) const {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "family/family.h"
 #include "train/training_data.h"
 #include "warp/grid.h"
 #include "warp/proposal.h"
@@ -48,13 +49,16 @@ class Learner {
   /// Of the iterations that were drawn about as well as the best one, row by row in turn, `most` rows at most.
   Examples pooled(std::size_t most) const;
   void learn_grid(const Examples& examples, bool tempered);
-  void learn_flow(Examples examples, bool tempered);
-  void learn_tree(Examples examples, bool tempered);
+  void learn_warp(Examples examples, bool tempered);
   /// The same examples as the grid's latents.
   Examples behind_grid(Examples examples) const;
 
+  /// Whether a flow may stand in front of the grid.
+  bool has_front() const;
+
   int m_dims;
   std::string m_family;
+  const JointFamily* m_adapts;  ///< what is fitted to points, behind the grid if there is one
   std::uint64_t m_seed;
   std::size_t m_memory;
   std::uint64_t m_trained = 0;

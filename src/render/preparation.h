@@ -44,8 +44,8 @@ class Preparer {
                                                const TrainSettings& settings);
   /// Gathers preparation.candidate_count candidates and trains; the preparation is told what they cost, and keeps the
   /// first chunk.
-  Fit train_in_chunks(const Layout& layout, const TrainSettings& settings, const Proposal* init,
-                      Preparation& preparation);
+  Fit fit_in_chunks(const Method& method, const TrainSettings& settings, const Proposal* init,
+                    Preparation& preparation);
   void fit(const Method& method, const TrainSettings& settings, Preparation& preparation);
 
   std::shared_ptr<const Tracer> m_tracer;

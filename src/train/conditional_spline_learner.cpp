@@ -123,7 +123,7 @@ ConditionalSplineLearner::ConditionalSplineLearner(const ConditionalSplineSettin
           std::make_shared<const ConditionalSpline::Shape>(settings.flow, settings.position_bins, settings.film_bins)),
       m_optimisers([&] {
         FlowTraining training = settings.flow;
-        training.uniform = uniform;
+        training.expected_uniform_share = uniform;
         const spline::Flow& flow = m_shape->flow;
         return std::array{FlowOptimiser(flow, flow.initial(mix64(seed ^ kWeightStream)), training),
                           FlowOptimiser(flow, flow.initial(mix64(seed ^ kWeightStream) + 1), training)};

@@ -291,7 +291,7 @@ FieldLearner::ByShare FieldLearner::pool(SurfaceKind kind, Draws Cell::*draws) c
 double FieldLearner::best_uniform(const Draws& draws, const ByShare& pooled) const {
   const double whole = std::accumulate(draws.with_share.begin(), draws.with_share.end(), 0.0);
   const double weight = whole > 0 ? draws.effective() / whole : 0;
-  double least = HUGE_VAL, best = m_settings.uniform;
+  double least = HUGE_VAL, best = m_settings.first_uniform_share;
   for (std::size_t s = 0; s < pooled.size(); ++s) {
     const double square = weight * draws.with_share[s] + kLikeOthers * pooled[s];
     if (square > 0 && square < least) least = square, best = kUniform[s];

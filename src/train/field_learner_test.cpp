@@ -92,7 +92,7 @@ TEST(FieldLearner, DensityGoesWithTheMean) {
   // On a quarter of the square of directions `scatter_return` is 6 or 0, with mean 3; elsewhere it is 1.
   FieldSettings settings;
   settings.max_cells = 1;
-  settings.uniform = 0.1;
+  settings.first_uniform_share = 0.1;
   const auto field = taught(settings, 100);
   const double value = 3, mean = 0.25 * value + 0.75;
   // Mean of q over a quarter of the square: bins differ, probabilities are rounded.
@@ -112,7 +112,7 @@ TEST(FieldLearner, DensityGoesWithTheMean) {
 TEST(FieldLearner, CellsTellPlacesApart) {
   FieldSettings settings;
   settings.split_at = 5000;
-  settings.uniform = 0.1;
+  settings.first_uniform_share = 0.1;
   const auto field = taught(settings, 100);
   EXPECT_GT(field->tree().cells(), 40u);
   EXPECT_LT(field->tree().cells(), 200u);
@@ -190,7 +190,7 @@ TEST(FieldLearner, ValuesThatAreNotFiniteTeachNothing) {
 
 TEST(FieldLearner, GoesOnFromAFieldAsIfItHadTaughtItself) {
   FieldSettings settings;
-  settings.uniform = 0.1;
+  settings.first_uniform_share = 0.1;
   const auto field = taught(settings, 100);
   const Batch batch(1, 200);
   const auto differ = [&](const Field& other) {

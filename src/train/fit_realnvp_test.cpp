@@ -199,7 +199,7 @@ TEST(FitRealNvp, LowersTheVariance) {
   for (std::size_t i = 0; i < examples.size(); ++i) examples.inv_q.push_back(1 / std::max(2 * examples.y(i, 0), 1e-3f));
   RealNvpSettings s = small();
   s.loss = RealNvpSettings::Loss::variance;
-  s.uniform = 0.05;
+  s.expected_uniform_share = 0.05;
   s.max_steps = 400;
   const auto& points = fit_realnvp(ExampleSet(examples), s, 1).log.points;
   EXPECT_NEAR(points.front().held_out, std::log(4.0 / 3), 0.02);

@@ -118,7 +118,7 @@ TEST(FitSpline, LowersTheVariance) {
   for (std::size_t i = 0; i < examples.size(); ++i) examples.inv_q.push_back(1 / std::max(2 * examples.y(i, 0), 1e-3f));
   SplineSettings s = small();
   s.loss = Loss::variance;
-  s.uniform = 0.05;
+  s.expected_uniform_share = 0.05;
   s.max_steps = 400;
   const auto& points = fit_spline(ExampleSet(examples), s, 1).log.points;
   EXPECT_NEAR(points.front().held_out, std::log(4.0 / 3), 0.02);

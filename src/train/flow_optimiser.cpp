@@ -19,7 +19,7 @@ FlowObjective initial_objective(const FlowTraining& settings, const ExampleBlock
   double scale = 0;
   for (std::size_t i = 0; i < batch.examples; ++i)
     scale += static_cast<double>(batch.weight[i]) * static_cast<double>(batch.target[i]);
-  return {settings.loss, settings.uniform, std::max(scale, 1e-30)};
+  return {settings.loss, settings.expected_uniform_share, std::max(scale, 1e-30)};
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ void FlowTrainer::next_batch() {
 
 double FlowTrainer::held_out_loss(const Floats& parameters) const {
   // No part of the loss is cut off here.
-  const FlowObjective objective{m_settings.loss, m_settings.uniform, 1e30};
+  const FlowObjective objective{m_settings.loss, m_settings.expected_uniform_share, 1e30};
   PackedParameters packed;
   m_flow.pack(parameters.data(), packed, false);
   std::vector<double> sums(m_held_out.count);

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,9 +18,9 @@ struct FlowTraining {
   enum class Loss { likelihood, variance } loss = Loss::variance;
   double rate = 6e-3;  ///< Adam's step size at the start; it falls when the held-out loss no longer does
   int batch = 2000;
-  int max_steps = 10'000;  ///< training ends sooner, when the held-out loss no longer falls
-  double held_out = 0.05;  ///< share of the examples that is never trained on
-  double uniform = 0.1;    ///< share of uniform samples that Loss::variance counts on
+  int max_steps = 10'000;               ///< training ends sooner, when the held-out loss no longer falls
+  double held_out = 0.05;               ///< share of the examples that is never trained on
+  double expected_uniform_share = 0.1;  ///< of the samples that are drawn, which Loss::variance counts on
   /// Each time an example is shown, it is moved by a Gaussian of jitter / sqrt(examples) in each dimension (as wide as
   /// a slab that holds sqrt(examples) of them, times this), so that small sets are not learned by heart. 0: not at all.
   double jitter = 0;
@@ -110,7 +111,7 @@ struct FieldSettings {
   double split_at = 2500;  ///< vertices in a cell after which it is cut in two
   /// A bin is drawn to those around it as if by so many samples of theirs, unless it differs from them for certain.
   double shrink = 48;
-  double uniform = 0.4;  ///< share of uniform numbers until cells have found out which one is best for them
+  double first_uniform_share = 0.4;  ///< of a cell's numbers, until it has found out which share is best for it
   double trust = 1;  ///< effective samples of a cell, (sum f)^2 / sum f^2, that count as much as the uniform density
   Layout numbers;    ///< that are warped: bounce1.lobe+bounce1.dir, ...; empty: those of every vertex
 };
@@ -124,10 +125,10 @@ struct GridSettings {
 };
 
 struct TrainSettings {
-  std::string family = "realnvp";           ///< grid, kdtree, realnvp, spline, uniform
+  TrainSettings() { kdtree.target = KdTreeSettings::Target::second_moment; }
   std::uint64_t examples = 16 * 200 * 160;  ///< |S|; epp-k is k x 200 x 160
   double alpha = 8;                         ///< |T| / |S|
-  double uniform = 0.1;                     ///< share of uniform samples in the mixture; 0 hands out the bare warp
+  double uniform_share = 0.1;               ///< of the samples of a mixture; 0 hands out the bare warp
   std::uint64_t seed = 0;
   RealNvpSettings realnvp;
   SplineSettings spline;
@@ -136,6 +137,8 @@ struct TrainSettings {
   KdTreeSettings kdtree;
   GridSettings grid;
   FieldSettings field;
+  std::filesystem::path init;     ///< a saved warp to start from; empty: none
+  bool candidates_count = false;  ///< in the image
 };
 
 /// How training went: one point per evaluation of the held-out likelihood.

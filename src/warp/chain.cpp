@@ -41,12 +41,13 @@ void Chain::save(TensorFile& file, const std::string& prefix) const {
   m_outer->save(file, prefix + "outer.");
 }
 
-std::shared_ptr<const Chain> Chain::load(const TensorFile& file, const std::string& prefix) {
+std::shared_ptr<const Chain> Chain::load(const TensorFile& file, const std::string& prefix,
+                                         const ProposalLoader& load_part) {
   const int dims = load_dims(file, prefix);
   const auto part = [&](const char* name) {
     // Chains of chains could nest without end in a file that is not ours.
     if (file.meta(prefix + name + "family") == "chain") fail_load(file, prefix, "a chain within a chain");
-    auto warp = std::dynamic_pointer_cast<const Warp>(load_proposal(file, prefix + name));
+    auto warp = std::dynamic_pointer_cast<const Warp>(load_part(file, prefix + name));
     if (!warp) fail_load(file, prefix, "a chain of what is no warp");
     if (warp->dims() != dims) fail_load(file, prefix, "a part of other dimensions than the chain's");
     return warp;

@@ -1,4 +1,5 @@
 #pragma once
+#include "warp/load.h"
 #include "warp/proposal.h"
 
 namespace warpath {
@@ -16,7 +17,8 @@ class Chain : public Warp {
   void forward(Batch<const double> z, Batch<double> y, std::span<double> log_det) const override;
   void inverse(Batch<const double> y, Batch<double> z, std::span<double> log_det) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
-  static std::shared_ptr<const Chain> load(const TensorFile& file, const std::string& prefix);
+  static std::shared_ptr<const Chain> load(const TensorFile& file, const std::string& prefix,
+                                           const ProposalLoader& load_part);
 
  private:
   std::shared_ptr<const Warp> m_inner, m_outer;

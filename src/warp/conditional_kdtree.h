@@ -26,7 +26,7 @@ class ConditionalKdTree final : public VertexProposal {
   bool warps(VertexDecision which, std::uint16_t bounce) const override {
     return holds_decision(m_numbers, which, bounce);
   }
-  const Layout& numbers() const { return m_numbers; }
+  const Layout& numbers() const override { return m_numbers; }
   /// A place is a tile of each tiling.
   std::size_t place_size() const override { return static_cast<std::size_t>(m_tiling.tilings); }
   void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;

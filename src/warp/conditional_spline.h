@@ -31,7 +31,7 @@ class ConditionalSpline final : public VertexProposal {
   bool warps(VertexDecision which, std::uint16_t bounce) const override {
     return holds_decision(m_numbers, which, bounce);
   }
-  const Layout& numbers() const { return m_numbers; }
+  const Layout& numbers() const override { return m_numbers; }
   /// There is nothing to find out beforehand.
   std::size_t place_size() const override { return 0; }
   void locate(const VertexContext&, std::size_t, std::uint32_t*) const override {}

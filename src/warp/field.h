@@ -44,7 +44,7 @@ class Field final : public VertexProposal {
   bool warps(VertexDecision which, std::uint16_t bounce) const override {
     return holds_decision(m_numbers, which, bounce);
   }
-  const Layout& numbers() const { return m_numbers; }
+  const Layout& numbers() const override { return m_numbers; }
   /// A place is a cell.
   void locate(const VertexContext& context, std::size_t n, std::uint32_t* places) const override;
   void sample(VertexDecision which, const VertexContext& context, const std::uint32_t* places, std::size_t n,

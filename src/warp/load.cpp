@@ -1,46 +1,10 @@
 #include "warp/load.h"
 
-#include <array>
 #include <charconv>
 
-#include "warp/chain.h"
-#include "warp/grid.h"
-#include "warp/kdtree.h"
-#include "warp/mixture.h"
-#include "warp/realnvp.h"
-#include "warp/spline.h"
-#include "warp/uniform.h"
 #include "warpath/error.h"
 
 namespace warpath {
-namespace {
-
-struct Family {
-  std::string_view name;
-  std::shared_ptr<const Proposal> (*load)(const TensorFile&, const std::string&);
-};
-
-template <class T>
-std::shared_ptr<const Proposal> load_as(const TensorFile& file, const std::string& prefix) {
-  return T::load(file, prefix);
-}
-
-constexpr std::array kFamilies{Family{"uniform", load_as<Uniform>}, Family{"grid", load_as<Grid>},
-                               Family{"kdtree", load_as<KdTree>},   Family{"realnvp", load_as<RealNvp>},
-                               Family{"spline", load_as<Spline>},   Family{"chain", load_as<Chain>},
-                               Family{"mixture", load_as<Mixture>}};
-
-}  // namespace
-
-std::shared_ptr<const Proposal> load_proposal(const TensorFile& file, const std::string& prefix) {
-  const std::string& name = file.meta(prefix + "family");
-  std::array<std::string_view, kFamilies.size()> known;
-  for (std::size_t k = 0; k < kFamilies.size(); ++k) {
-    if (kFamilies[k].name == name) return kFamilies[k].load(file, prefix);
-    known[k] = kFamilies[k].name;
-  }
-  fail_load(file, prefix, fmt::format("unknown family \"{}\";{}", name, suggestion(name, known)));
-}
 
 void save_header(TensorFile& file, const std::string& prefix, const Proposal& proposal) {
   file.metadata()[prefix + "family"] = proposal.family();

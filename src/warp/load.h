@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -9,9 +10,9 @@ namespace warpath {
 
 inline constexpr int kMaxDims = 256;  ///< of every proposal; of a kd-tree KdTree::kMaxDims
 
-/// The proposal that Proposal::save put under `prefix`, of whatever family. Throws FileError if it is unknown or
-/// broken.
-std::shared_ptr<const Proposal> load_proposal(const TensorFile& file, const std::string& prefix);
+/// Loads a proposal of whatever family that Proposal::save put under a prefix. Throws FileError.
+using ProposalLoader =
+    std::function<std::shared_ptr<const Proposal>(const TensorFile& file, const std::string& prefix)>;
 
 /// What every family stores: `<prefix>family` and `<prefix>dims` in the metadata.
 void save_header(TensorFile& file, const std::string& prefix, const Proposal& proposal);

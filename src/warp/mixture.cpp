@@ -108,7 +108,8 @@ void Mixture::save(TensorFile& file, const std::string& prefix) const {
   file.put<double>(prefix + "weights", {static_cast<std::int64_t>(weights.size())}, weights);
 }
 
-std::shared_ptr<const Mixture> Mixture::load(const TensorFile& file, const std::string& prefix) {
+std::shared_ptr<const Mixture> Mixture::load(const TensorFile& file, const std::string& prefix,
+                                             const ProposalLoader& load_component) {
   const int dims = load_dims(file, prefix);
   const std::vector<double> weights = file.get<double>(prefix + "weights").values;
   if (weights.empty() || weights.size() > kMaxComponents)
@@ -120,7 +121,7 @@ std::shared_ptr<const Mixture> Mixture::load(const TensorFile& file, const std::
     const std::string name = fmt::format("{}component{}.", prefix, k);
     // A mixture never holds mixtures, so a file in which they nest is not ours, and could nest without end.
     if (file.meta(name + "family") == "mixture") fail_load(file, name, "a mixture within a mixture");
-    components.push_back({load_proposal(file, name), weights[k]});
+    components.push_back({load_component(file, name), weights[k]});
     if (components.back().proposal->dims() != dims) fail_load(file, name, "dimensions other than the mixture's");
   }
   return std::make_shared<Mixture>(components);

@@ -2,6 +2,7 @@
 #include <array>
 #include <vector>
 
+#include "warp/load.h"
 #include "warp/proposal.h"
 
 namespace warpath {
@@ -25,7 +26,8 @@ class Mixture : public Proposal {
               std::span<double> log_q) const override;
   void log_density(Batch<const double> y, std::span<double> log_q) const override;
   void save(TensorFile& file, const std::string& prefix) const override;
-  static std::shared_ptr<const Mixture> load(const TensorFile& file, const std::string& prefix);
+  static std::shared_ptr<const Mixture> load(const TensorFile& file, const std::string& prefix,
+                                             const ProposalLoader& load_component);
 
  private:
   static constexpr std::size_t kMaxComponents = 64;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "path/layout.h"
 #include "path/primary_source.h"
 
 namespace warpath {
@@ -20,6 +21,8 @@ class VertexProposal {
  public:
   virtual ~VertexProposal() = default;
   virtual std::string family() const = 0;
+  /// The numbers that it draws, see check_decisions; empty for those of every vertex.
+  virtual const Layout& numbers() const = 0;
   /// Whether these numbers of the bounce-th vertex are its own; else they are uniform.
   virtual bool warps(VertexDecision, std::uint16_t /*bounce*/) const { return true; }
   /// How many 32-bit words what is found out about a vertex takes.

@@ -5,15 +5,15 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "family/fit.h"
+#include "family/warp_file.h"
 #include "train/fit_grid.h"
 #include "train/fit_kdtree.h"
 #include "train/resample.h"
 #include "train/test_integrand.h"
-#include "train/train.h"
 #include "warp/check.h"
 #include "warp/mixture.h"
 #include "warp/uniform.h"
-#include "warp/warp_file.h"
 #include "warpath/error.h"
 
 namespace warpath {

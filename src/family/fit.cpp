@@ -1,4 +1,4 @@
-#include "train/train.h"
+#include "family/fit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,6 @@
 
 #include "core/rng.h"
 #include "core/stopwatch.h"
-#include "train/fit_grid.h"
-#include "train/fit_kdtree.h"
-#include "train/fit_realnvp.h"
-#include "train/fit_spline.h"
-#include "train/resample.h"
 #include "warp/mixture.h"
 #include "warp/scratch.h"
 #include "warp/uniform.h"
@@ -19,13 +14,8 @@
 namespace warpath {
 namespace {
 
-constexpr std::uint64_t kHeldOut = 64;             // one candidate of so many judges a kd-tree or a grid
-constexpr std::size_t kMaxTreeBytes = 3ull << 30;  // rows that a kd-tree may be grown from, its working copy included
-
-// Rows that a spline flow learns from, drawn from the candidates it has anyway: with fewer it soon knows them by heart.
-constexpr std::uint64_t kSplineRows = std::uint64_t{1} << 22;
-// Brighter candidates teach a spline flow no more than this, in units of E[g^2] / E[g], the mean over examples.
-constexpr double kSplineMostTarget = 3;
+constexpr std::uint64_t kHeldOut = 64;                   // one candidate of so many judges what is fitted to candidates
+constexpr std::uint64_t kMostExampleBytes = 3ull << 30;  // rows that are fitted to at once, a working copy included
 
 /// The component that was learned: a mixture's first one that is not uniform.
 const Proposal* learned(const Proposal* proposal) {
@@ -55,23 +45,16 @@ double cross_entropy(const Proposal& proposal, const Examples& examples) {
   return weights > 0 ? sum / weights : 0;
 }
 
-/// Fits a kd-tree or a grid to all candidates but a few that are held out.
-Fit fit_to_candidates(const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
+/// Fits to all candidates but a few that are held out.
+Fit fit_to_candidates(const FitToCandidates& fit_family, const Candidates& candidates, const TrainSettings& settings,
+                      const Proposal* init) {
   const Stopwatch clock;
   const std::uint64_t held_out = candidates.size() / kHeldOut;
   std::uint64_t count = candidates.size() - held_out;
   const std::uint64_t row_bytes = 2 * sizeof(float) * (static_cast<std::uint64_t>(candidates.layout.dims()) + 1);
-  count = std::min(count, kMaxTreeBytes / row_bytes);
-  Examples examples = weighted_examples(candidates, 0, count);
+  count = std::min(count, kMostExampleBytes / row_bytes);
   Fit fit;
-  if (settings.family == "grid") {
-    const auto* grid = dynamic_cast<const Grid*>(init);
-    if (init && !grid) throw ConfigError(fmt::format("a grid cannot start from a warp of family {}", init->family()));
-    fit.proposal = fit_grid(examples, settings.grid, grid);
-  } else {
-    if (init) throw ConfigError("a kd-tree cannot start from a trained warp");
-    fit.proposal = fit_kdtree(std::move(examples), settings.kdtree);
-  }
+  fit.proposal = fit_family(weighted_examples(candidates, 0, count), settings, init);
   fit.log.seconds = clock.wall();
   fit.log.cpu_seconds = clock.cpu();
   fit.log.stopped = count == candidates.size() - held_out
@@ -88,12 +71,8 @@ constexpr auto kDark = "no candidate has any light";
 
 /// Throws ConfigError for settings that make no sense.
 void check(const TrainSettings& settings, const Layout& layout, const Proposal* init) {
-  constexpr std::string_view kFamilies[] = {"uniform", "grid", "kdtree", "realnvp", "spline"};
-  if (std::find(std::begin(kFamilies), std::end(kFamilies), settings.family) == std::end(kFamilies))
-    throw ConfigError(
-        fmt::format("unknown warp family \"{}\";{}", settings.family, suggestion(settings.family, kFamilies)));
-  if (!(settings.uniform >= 0 && settings.uniform < 1))
-    throw ConfigError(fmt::format("the share of uniform samples is {}, not in [0, 1)", settings.uniform));
+  if (!(settings.uniform_share >= 0 && settings.uniform_share < 1))
+    throw ConfigError(fmt::format("the share of uniform samples is {}, not in [0, 1)", settings.uniform_share));
   if (init && init->dims() != layout.dims())
     throw ConfigError(fmt::format("the warp to start from has {} dimensions, not {}", init->dims(), layout.dims()));
 }
@@ -104,10 +83,10 @@ Fit untrained(const Layout& layout, std::string why) {
 
 /// What was learned, mixed with its share of uniform samples.
 Fit with_uniform(Fit fit, const TrainSettings& settings) {
-  if (settings.uniform > 0)
-    fit.proposal = std::make_shared<Mixture>(
-        std::vector<Mixture::Component>{{fit.proposal, 1 - settings.uniform},
-                                        {std::make_shared<const Uniform>(fit.proposal->dims()), settings.uniform}});
+  if (settings.uniform_share > 0)
+    fit.proposal = std::make_shared<Mixture>(std::vector<Mixture::Component>{
+        {fit.proposal, 1 - settings.uniform_share},
+        {std::make_shared<const Uniform>(fit.proposal->dims()), settings.uniform_share}});
   return fit;
 }
 
@@ -122,24 +101,24 @@ std::uint64_t candidate_count(const TrainSettings& settings) {
   return static_cast<std::uint64_t>(count);
 }
 
-Fit train(const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
-  if (trains_in_chunks(settings.family))
-    return train_in_chunks(
-        candidates.layout, candidates.size(), [&](const auto& take) { take(candidates); }, settings, init);
+Fit fit(const JointFamily& family, const Candidates& candidates, const TrainSettings& settings, const Proposal* init) {
+  if (fits_in_chunks(family))
+    return fit_in_chunks(
+        family, candidates.layout, candidates.size(), [&](const auto& take) { take(candidates); }, settings, init);
   check(settings, candidates.layout, init);
-  if (settings.family == "uniform") return untrained(candidates.layout, "nothing to learn");
+  if (!family.learns()) return untrained(candidates.layout, "nothing to learn");
   if (!(target_moments(candidates).mean > 0)) return untrained(candidates.layout, kDark);
-  return with_uniform(fit_to_candidates(candidates, settings, learned(init)), settings);
+  return with_uniform(fit_to_candidates(std::get<FitToCandidates>(family.fit), candidates, settings, learned(init)),
+                      settings);
 }
 
-bool trains_in_chunks(const std::string& family) { return family == "realnvp" || family == "spline"; }
+bool fits_in_chunks(const JointFamily& family) { return std::holds_alternative<FitToExamples>(family.fit); }
 
-Fit train_in_chunks(const Layout& layout, std::uint64_t count, const CandidateChunks& chunks,
-                    const TrainSettings& settings, const Proposal* init) {
+Fit fit_in_chunks(const JointFamily& family, const Layout& layout, std::uint64_t count, const CandidateChunks& chunks,
+                  const TrainSettings& settings, const Proposal* init) {
   check(settings, layout, init);
-  WARPATH_CHECK(trains_in_chunks(settings.family));
-  const bool spline = settings.family == "spline";
-  const std::uint64_t rows = spline ? std::max(settings.examples, std::min(count, kSplineRows)) : settings.examples;
+  const auto& to_examples = std::get<FitToExamples>(family.fit);
+  const std::uint64_t rows = to_examples.count ? to_examples.count(settings, count) : settings.examples;
   Resampler resampler(layout, count, rows, mix64(settings.seed + 1));
   double seconds = 0, cpu_seconds = 0;
   std::optional<float> most;  // told by the first chunk with light
@@ -147,23 +126,27 @@ Fit train_in_chunks(const Layout& layout, std::uint64_t count, const CandidateCh
     const Stopwatch clock;
     if (!most)
       if (const TargetMoments moments = target_moments(chunk); moments.mean > 0)
-        most = static_cast<float>(spline ? kSplineMostTarget * moments.mean_square / moments.mean : HUGE_VAL);
+        most = to_examples.most_target > 0
+                   ? static_cast<float>(to_examples.most_target * moments.mean_square / moments.mean)
+                   : HUGE_VALF;
     resampler.add(chunk, most.value_or(HUGE_VALF));
     seconds += clock.wall();
     cpu_seconds += clock.cpu();
   });
   const ResampledExamples examples = std::move(resampler).take();
   if (examples.size() == 0) return untrained(layout, kDark);
-
-  const auto counting_on = [&](auto flow) {
-    flow.uniform = settings.uniform;
-    return flow;
-  };
-  Fit fit = spline ? fit_spline(examples, counting_on(settings.spline), settings.seed, learned(init))
-                   : fit_realnvp(examples, counting_on(settings.realnvp), settings.seed, learned(init));
+  Fit fit = to_examples.fit(examples, settings, learned(init));
   fit.log.seconds += seconds;
   fit.log.cpu_seconds += cpu_seconds;
   return with_uniform(std::move(fit), settings);
+}
+
+const JointFamily& joint_family(std::string_view name) {
+  const Family* family = find_family(name);
+  if (family && family->joint()) return *family->joint();
+  const auto names = family_names([](const Family& f) { return f.joint(); });
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  throw ConfigError(fmt::format("unknown warp family \"{}\";{}", name, suggestion(name, known)));
 }
 
 }  // namespace warpath

@@ -1,10 +1,7 @@
-#include "warp/warp_file.h"
+#include "family/warp_file.h"
 
 #include "core/tensor_file.h"
-#include "warp/conditional_kdtree.h"
-#include "warp/conditional_spline.h"
-#include "warp/field.h"
-#include "warp/load.h"
+#include "family/family.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -46,18 +43,10 @@ WarpFile load_warp(const std::filesystem::path& path) {
     throw FileError(
         fmt::format("{}: format \"{}\"; this version of warpath reads \"{}\"", path.string(), format, kFormat));
   WarpFile file;
-  if (const std::string& family = tensors.meta(kPrefix + "family"); family == "field") {
-    const auto field = Field::load(tensors, kPrefix);
-    file.vertex_proposal = field;
-    file.layout = field->numbers();
-  } else if (family == "conditional-kdtree") {
-    const auto tree = ConditionalKdTree::load(tensors, kPrefix);
-    file.vertex_proposal = tree;
-    file.layout = tree->numbers();
-  } else if (family == "conditional-spline") {
-    const auto spline = ConditionalSpline::load(tensors, kPrefix);
-    file.vertex_proposal = spline;
-    file.layout = spline->numbers();
+  const Family* family = find_family(tensors.meta(kPrefix + "family"));
+  if (family && family->at_vertices()) {
+    file.vertex_proposal = family->at_vertices()->load(tensors, kPrefix);
+    file.layout = file.vertex_proposal->numbers();
   } else {
     try {
       file.layout = Layout::parse(tensors.meta("layout"));
