@@ -94,3 +94,8 @@ def densities_of(folder, methods, x, y):
     """Rows of the true density over two numbers (the candidates'), then of what each method learned of it."""
     found = {d["method"]: d for d in page_data(folder)["densities"] if (d["x_dimension"], d["y_dimension"]) == (x, y)}
     return [density_rows(found[methods[0]]["candidates"]), *(density_rows(found[method]["learned"]) for method in methods)]
+
+
+def write_strip(folder, methods, crop, name="side-by-side.png"):
+    """The same part of three images in a row: two methods and the reference."""
+    write_png(folder / name, side_by_side(images_of(folder, methods, crop=crop)))

@@ -3,7 +3,8 @@
 import math
 
 from plot import line_chart
-from tables import comparison_table, gain, mean, of_method, standard_error, write_table
+from records import write_record
+from tables import gain, mean, of_method, rows_of, standard_error
 from tool import compare, folder_of, render_reference, train, turned_scene
 
 ANGLES = (10, 45, 90)
@@ -22,21 +23,22 @@ def reuse():
     """
     scene = turned_scene("white-room")
     weights, _, _ = train("reuse", scene, WARP, **FILM, epp=8, max_steps=500)
-    retrain("reuse", scene, weights, ANGLES, (10, 30, 100), "ln E[g / q]", 0.02, epp=1)
+    tables = retrain("reuse", scene, weights, ANGLES, (10, 30, 100), "ln E[g / q]", 0.02, epp=1)
     field, _, _ = train("reuse/field", scene, "field", **FILM, epp=8)
     fields = []
     for angle in ANGLES:
         turned, measure, base = baselines("reuse", scene, angle)
         fielded = compare(f"reuse/{angle}/field", scene, ["field", field], **turned, **measure)
-        fields += comparison_table(base + [{**run, "method": "field, trained before" if run["method"] == str(field) else "field"} for run in fielded])
-    write_table(folder_of("reuse"), fields, "field.md")
+        fields.append(by_training(angle, base, of_method(fielded, "field"), of_method(fielded, str(field))))
+    write_record("reuse", {**tables, "field": fields}, FILM)
 
 
 def reuse_published():
     """The same with networks, loss and rate as published, turned by 45 and 90 degrees."""
     scene = turned_scene("white-room")
     weights, _, _ = train("reuse-published", scene, WARP, **FILM, epp=4, max_steps=600, rate=1e-3, **PUBLISHED)
-    retrain("reuse-published", scene, weights, ANGLES[1:], (100, 200, 400, 800), "-ln q", 0.005, epp=4, rate=1e-4, **PUBLISHED)
+    tables = retrain("reuse-published", scene, weights, ANGLES[1:], (100, 200, 400, 800), "-ln q", 0.005, epp=4, rate=1e-4, **PUBLISHED)
+    write_record("reuse-published", tables, {**FILM, "epp": 4, "rate": 1e-4, **PUBLISHED})
 
 
 def baselines(label, scene, angle):
@@ -47,47 +49,50 @@ def baselines(label, scene, angle):
 
 
 def retrain(label, scene, weights, angles, all_steps, loss_name, tolerance, **training):
-    """Tables and charts of training from scratch and from `weights`, for so many steps; and of how much sooner the second comes within
+    """Rows and charts of training from scratch and from `weights`, for so many steps; rows of how much sooner the second comes within
     `tolerance` of the first one's best loss."""
-    table = ["| turned by | training | steps | CPU seconds | held-out loss | MSE | gain over uniform |", "|" + "---|" * 7]
-    times = ["| turned by | best loss from scratch | steps to come near it, from scratch | from reused weights | sooner |", "|" + "---|" * 5]
+    rows, times = [], []
     for angle in angles:
         turned, measure, base = baselines(label, scene, angle)
         uniform = of_method(base, UNIFORM)
-        table += [row(angle, f"`{name}`", "", "", of_method(base, name), uniform) for name in ("none", UNIFORM)]
         losses, gains = {}, {}
         for start, init in (("from scratch", {}), ("reused weights", {"init": weights})):
             for steps in all_steps:
                 place = f"{label}/{angle}/{start.replace(' ', '-')}-{steps}"
                 runs = compare(place, scene, [WARP], **turned, **measure, max_steps=steps, **training, **init)
-                loss = [run["training_curve"][-1]["held_out"] for run in runs]
-                losses.setdefault(start, []).append((steps, mean(loss), standard_error(loss)))
-                gains.setdefault(start, []).append((steps, *gain(uniform, runs, "mse")))
+                held_out = [run["training_curve"][-1]["held_out"] for run in runs]
+                loss, gained = [mean(held_out), standard_error(held_out)], gain(uniform, runs, "mse")
+                losses.setdefault(start, []).append((steps, *loss))
+                gains.setdefault(start, []).append((steps, *gained))
                 seconds = mean([run["train_cpu_seconds"] for run in runs])
-                table.append(row(angle, start, steps, f"{seconds:.2f}", runs, uniform, f"{mean(loss):.3f}"))
+                rows.append({"turned": f"{angle}°", "training": start, "steps": steps, "train_cpu_seconds": seconds, "held_out": loss, "mse_over_uniform": gained})
         folder = folder_of(f"{label}/{angle}")
         line_chart(folder / "loss.svg", "training steps", f"held-out loss, {loss_name}", losses)
         line_chart(folder / "gain.svg", "training steps", "gain in MSE over uniform", gains, rule=1)
-        times.append(f"| {angle}° | " + " | ".join(sooner(losses["from scratch"], losses["reused weights"], tolerance)) + " |")
-    write_table(folder_of(label), table)
-    write_table(folder_of(label), times, "sooner.md")
+        times.append({"turned": f"{angle}°", **sooner(losses["from scratch"], losses["reused weights"], tolerance)})
+    return {"white-room": rows, "sooner": times}
 
 
-def row(angle, what, steps, seconds, runs, uniform, loss=""):
-    mse = [run["mse"] for run in runs]
-    gained, error = gain(uniform, runs, "mse")
-    return f"| {angle}° | {what} | {steps} | {seconds} | {loss} | {mean(mse):.4g} ± {standard_error(mse):.2g} | {gained:.2f} ± {error:.2f} |"
+def by_training(angle, base, scratch, trained_before):
+    """A row: gains over plain path tracing of a field that learns anew in this view, and of one that learned in another."""
+    none, cells = of_method(base, "none"), {"turned": f"{angle}°"}
+    for key, name in (("relmse", "relMSE"), ("mse", "MSE")):
+        cells[f"{name} gain, from scratch"] = gain(none, scratch, key)
+        cells[f"{name} gain, trained before"] = gain(none, trained_before, key)
+    return cells
 
 
 def sooner(scratch, reused, tolerance):
-    """Cells: the best loss from scratch, where each line first comes within `tolerance` of it, and the ratio of both."""
+    """The best loss from scratch, where each line first comes within `tolerance` of it, and the ratio of both."""
     goal = min(loss for _, loss, _ in scratch) + tolerance
     first, second = steps_to(scratch, goal), steps_to(reused, goal)
-    cells = [f"{goal - tolerance:.3f}", f"{first:.0f}"]
-    if math.isinf(second):
-        return [*cells, "not reached", ""]
     at_once = second <= reused[0][0]
-    return [*cells, f"{'at most ' if at_once else ''}{second:.0f}", f"{'at least ' if at_once else ''}{first / second:.1f} ×"]
+    return {
+        "best loss from scratch": goal - tolerance,
+        "steps to come near it, from scratch": round(first),
+        "from reused weights": "not reached" if math.isinf(second) else f"{'at most ' if at_once else ''}{second:.0f}",
+        "sooner": "–" if math.isinf(second) else f"{'at least ' if at_once else ''}{first / second:.1f} ×",
+    }
 
 
 def steps_to(line, goal):

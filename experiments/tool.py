@@ -66,7 +66,16 @@ def stored_reference(name):
     return {"reference": image} if fits and image.exists() else {}
 
 
-def arguments(options, fixed=()):
+#: Families that mix in a share of uniform samples that --uniform sets.
+MIXED = ("grid", "kdtree", "realnvp", "spline", "conditional-kdtree", "conditional-spline")
+
+
+def mixes(methods):
+    """Whether --uniform is for any of these methods: the command line refuses options that none of them uses."""
+    return any(str(method).partition(":")[0] in MIXED for method in methods)
+
+
+def arguments(options, fixed=(), methods=()):
     """Options as the command line has them: max_depth=8 is --max-depth 8; `defines` are -D. What was set for all comes first,
     but for what is `fixed`."""
     words = []
@@ -75,7 +84,7 @@ def arguments(options, fixed=()):
             words += [word for key, item in value.items() for word in ("-D", f"{key}={item}")]
         else:
             words += [f"--{name.replace('_', '-')}", str(value if name in fixed else SETTINGS.overrides.get(name, value))]
-    everywhere = [key for key in ("seed", "uniform") if key in SETTINGS.overrides and key not in (*options, *fixed)]
+    everywhere = [key for key in ("seed", *(["uniform"] if mixes(methods) else [])) if key in SETTINGS.overrides and key not in (*options, *fixed)]
     return words + [word for key in everywhere for word in (f"--{key}", SETTINGS.overrides[key])]
 
 
@@ -124,7 +133,7 @@ def folder_of(label):
 def compare(label, scene, methods, **options):
     """The runs of `warpath compare`, whose report, images and results.json land in out/experiments/LABEL."""
     folder = folder_of(label)
-    run(label, "compare", scene, "--methods", ",".join(map(str, methods)), "--report", folder, *arguments(options))
+    run(label, "compare", scene, "--methods", ",".join(map(str, methods)), "--report", folder, *arguments(options, methods=methods))
     with open(folder / "results.json", encoding="utf-8") as file:
         results = json.load(file)["results"]
     runs = int(SETTINGS.overrides.get("runs", options.get("runs", 1)))
@@ -142,7 +151,7 @@ def spp_of(options):
 def train(label, scene, warp, **options):
     """A trained warp's file, CPU seconds (candidates, fitting, loading the scene), peak memory in bytes."""
     file = folder_of(label) / "trained.warp"
-    return file, *run(label, "train", scene, "--warp", warp, "-o", file, *arguments(options))
+    return file, *run(label, "train", scene, "--warp", warp, "-o", file, *arguments(options, methods=[warp]))
 
 
 def render_reference(label, scene, spp, warp="field", **options):
@@ -150,3 +159,8 @@ def render_reference(label, scene, spp, warp="field", **options):
     image = folder_of(label) / "reference.exr"
     run(label, "render", scene, "--warp", warp, "-o", image, *arguments({"seed": 999, "spp": spp, **options}, fixed=("seed", "spp", "uniform")))
     return {"reference": image}
+
+
+def render(label, scene, image, **options):
+    """An image for its own sake."""
+    run(label, "render", scene, "-o", image, *arguments(options))
