@@ -58,7 +58,8 @@ class Row:
         return f"{number} {self.unit}".strip()
 
     def as_dict(self):
-        return {**vars(self), "bound": str(self.bound) if self.bound else None, "holds": self.holds()}
+        """As a row of a record; see experiments/markdown.py."""
+        return {"task": self.task, "what": self.what, "measured": self.shown(), "must show": str(self.bound or "–"), "note": self.note or "–"}
 
 
 def tasks():

@@ -14,6 +14,7 @@ HEADINGS = {
     "relmse_gain_by_cost": "relMSE gain at equal CPU time",
     "mse_over_uniform": "MSE gain over `uniform`",
     "mse_over_path": "MSE gain over `path`",
+    "published": "published",
     "pays_after": "pays after, CPU s",
     "candidate_cpu_seconds": "candidates, CPU s",
     "resample_cpu_seconds": "resampling, CPU s",
@@ -51,6 +52,12 @@ def pair(value, error):
     if value:
         digits = min(digits, max(0, 3 - math.floor(math.log10(abs(value)))))
     return f"{value:,.{digits}f} ± {error:.{digits}f}"
+
+
+def short(value, error=0.0):
+    """For running text: without the error, and with two digits behind the point at most."""
+    digits = decimals_for(error) if error > 0 else max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{min(digits, 2 if abs(value) >= 0.1 else digits)}f}"
 
 
 def cell(row, key):

@@ -1,9 +1,14 @@
 """What an experiment leaves for the documentation: rows of its tables, with the build, the machine and the settings that they are of."""
 
 import json
+import os
 import pathlib
+import platform
+import re
 import shutil
+import subprocess
 import sys
+import time
 
 import markdown
 from tool import ROOT, SETTINGS, folder_of
@@ -35,6 +40,17 @@ def provenance(name):
         "date": last["date"][:10],
         "machine": f"{last['threads']} threads of {last['cpu']}",
     }
+
+
+def record_of_bench(name, command, tables, settings=""):
+    """The same of a benchmark in bench/, which runs what this checkout holds: as text."""
+    build = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=12"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+    version = re.search(r"project\(warpath VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+    info = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    cpu = next((line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name")), platform.machine())
+    about = {"experiment": name, "command": command, "version": version, "build": build, "date": time.strftime("%Y-%m-%d", time.gmtime()),
+             "machine": f"{len(os.sched_getaffinity(0))} threads of {cpu}", "settings": settings}  # fmt: skip
+    return in_lines({**about, "tables": tables})
 
 
 def in_lines(record):

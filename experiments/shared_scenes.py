@@ -14,6 +14,8 @@ LOBE_5D = [f"{family}:film+bounce1.lobe+bounce1" for family in ("uniform", "real
 DEEPER = [f"{family}:film+bounce1+{more}" for more in ("bounce2", "bounce2+bounce3") for family in ("uniform", "realnvp")]
 BOTH = ("country-kitchen", "white-room")
 TWELVE = "film+" + "+".join(f"bounce{k}" for k in range(1, 6))
+#: Gains in MSE over plain path tracing on the Country Kitchen [ZZ19].
+PUBLISHED = {KDTREE: 1.82, REALNVP: 2.36, DEEPER[1]: 2.33, DEEPER[3]: 1.96}
 #: The kd-tree of Guo et al. [GBBE18]: cells split in the middle, dimensions in turn, densities by the mean.
 AS_PUBLISHED = {"kdtree_split": "cyclic", "kdtree_target": "mean"}
 
@@ -23,6 +25,10 @@ def reference(name):
     return stored_reference(f"{name}-d8") or {"reference_spp": 2048}
 
 
+def beside_published(rows):
+    return [{**row, **({"published": PUBLISHED[row["method"]]} if row["method"] in PUBLISHED else {})} for row in rows]
+
+
 def first_claim():
     """The paper's first claim: Real NVP in 4D beats the kd-tree as published, at equal samples, epp-16, 128 spp."""
     tables = {}
@@ -30,7 +36,8 @@ def first_claim():
         scene, against = shared_scene(name), reference(name)
         results = compare(f"first-claim/{name}", scene, ["none", UNIFORM, REALNVP], **PAPER, **against)
         published = compare(f"first-claim/{name}/kdtree", scene, [KDTREE], **PAPER, **against, **AS_PUBLISHED)
-        tables[name] = rows_of(results) + rows_of(published, results, "as published")
+        rows = rows_of(results) + rows_of(published, results, "as published")
+        tables[name] = beside_published(rows) if name == "country-kitchen" else rows
     write_record("first-claim", tables, PAPER)
 
 
@@ -51,7 +58,7 @@ def kitchen():
     """Country Kitchen, epp-16, 128 spp: plain path tracing, kd-tree, Real NVP in 4D, 5D, 6D and 8D."""
     methods = ["none", *WARPS_4D, *LOBE_5D, *DEEPER]
     results = compare("kitchen", shared_scene("country-kitchen"), methods, **PAPER, **reference("country-kitchen"))
-    write_record("kitchen", {"country-kitchen": rows_of(results)}, PAPER)
+    write_record("kitchen", {"country-kitchen": beside_published(rows_of(results))}, PAPER)
 
 
 def white_room():

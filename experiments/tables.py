@@ -72,10 +72,10 @@ def rows_of(results, baselines=None, label=None, baseline="none"):
         row = {"method": method, **({"label": label} if label else {}), "runs": len(runs), "spp": measured(runs, "spp")}
         for key in ("mse", "relmse"):
             row[key] = measured(runs, key)
-            row[f"{key}_gain"] = gain(base, runs, key)
-            row[f"{key}_gain_by_cost"] = gain_by_cost(base, runs, key)
+            row[f"{key}_gain"] = gain(base, runs, key) if method != baseline else 1.0
+            row[f"{key}_gain_by_cost"] = gain_by_cost(base, runs, key) if method != baseline else 1.0
         if uniform:
-            row["mse_over_uniform"] = gain(uniform, runs, "mse")
+            row["mse_over_uniform"] = gain(uniform, runs, "mse") if not method.startswith("uniform:") else 1.0
         if method != baseline:
             row["pays_after"] = pays_after(base, runs)
         row |= {f"{phase}_cpu_seconds": measured(runs, f"{phase}_cpu_seconds") for phase in PHASES}

@@ -145,7 +145,7 @@ def compare(label, scene, methods, **options):
 
 def spp_of(options):
     """What every run has at least, if it was not cut off."""
-    return float(SETTINGS.overrides.get("spp", options.get("spp", 0))) - 0.5
+    return float(SETTINGS.overrides.get("spp", options["spp"])) - 0.5 if "spp" in options else 0.0
 
 
 def train(label, scene, warp, **options):
