@@ -2,7 +2,6 @@
 import importlib.util
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -11,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "experiments"))
+from records import machine  # noqa: E402
+
 SIZE = "320x180"
 #: Whom the tracer is compared with; the version that tests/mitsuba checks images against.
 MITSUBA = "mitsuba==3.9.1"
@@ -66,17 +68,8 @@ def tasks():
     return sorted(folder.parent.name for folder in HERE.glob("*/task.py"))
 
 
-def machine():
-    """The processor's name, what of it this process may use, and its widest vectors."""
-    info = Path("/proc/cpuinfo").read_text()
-    name = next((line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name")), platform.machine())
-    vectors = "AVX-512" if " avx512f " in info else "AVX2" if " avx2 " in info else "SSE"
-    return {"cpu": name, "cores": len(os.sched_getaffinity(0)), "vectors": vectors, "system": platform.platform()}
-
-
 def table(rows):
-    m = machine()
-    lines = [f"{m['cores']} cores of {m['cpu']}, {m['vectors']}", "", "| task | what | value | must show | holds | |", "|---|---|---|---|---|---|"]
+    lines = [machine(), "", "| task | what | value | must show | holds | |", "|---|---|---|---|---|---|"]
     verdict = {None: "", True: "yes", False: "**no**"}
     lines += [f"| {r.task} | {r.what} | {r.shown()} | {r.bound or ''} | {verdict[r.holds()]} | {r.note} |" for r in rows]
     return "\n".join(lines)

@@ -42,14 +42,20 @@ def provenance(name):
     }
 
 
+def machine():
+    """What of this machine's processor may be used, its name, and its widest vectors."""
+    info = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    cpu = next((line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name")), platform.machine())
+    vectors = "AVX-512" if " avx512f " in info else "AVX2" if " avx2 " in info else "SSE"
+    return f"{len(os.sched_getaffinity(0))} cores of {cpu}, {vectors}"
+
+
 def record_of_bench(name, command, tables, settings=""):
     """The same of a benchmark in bench/, which runs what this checkout holds: as text."""
     build = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=12"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
     version = re.search(r"project\(warpath VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
-    info = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    cpu = next((line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name")), platform.machine())
     about = {"experiment": name, "command": command, "version": version, "build": build, "date": time.strftime("%Y-%m-%d", time.gmtime()),
-             "machine": f"{len(os.sched_getaffinity(0))} threads of {cpu}", "settings": settings}  # fmt: skip
+             "machine": machine(), "settings": settings}  # fmt: skip
     return in_lines({**about, "tables": tables})
 
 
