@@ -7,7 +7,7 @@
 A page says between comments what it wants, and gets it:
 
   <!-- table: NAME/TABLE, ... | key, ... | only ROW; ... -->  ...  <!-- end -->
-      Columns by the keys of the rows (`key as Heading` for another heading), of all rows or some. Tables of several scenes stand side by
+      Columns by the keys of the rows (`key as Heading` for another heading; a comma in a key is \\,), of all rows or some. Tables of several scenes stand side by
       side. Build, machine and command follow.
   <!-- text: words with {NAME/TABLE | ROW | key} among them -->  ...  <!-- end -->
       The same with figures.
@@ -63,13 +63,14 @@ def table(words):
     """Lines: the table that the words ask for, and what it is of."""
     places, keys, *only = (part.strip() for part in words.split("|"))
     sources = [rows_at(place) for place in places.split(",")]
-    first, *columns = ([part.strip() for part in key.split(" as ")] for key in keys.split(","))
+    names = [name.replace("\\,", ",") for name in re.split(r"(?<!\\),", keys)]
+    first, *columns = ([part.strip() for part in name.split(" as ")] for name in names)
     rows = {name: {first[0]: "–"} for _, _, found in sources for name in found}
-    heads = [(first[0], first[-1] if len(first) > 1 or first[0] != "method" else "")]
+    heads = [(first[0], first[1] if len(first) > 1 else "" if first[0] == "method" else markdown.heading(first[0]))]
     for _, title, found in sources:
         for key, *named in columns:
             head = named[0] if named else markdown.heading(key)
-            heads.append((f"{title}/{key}", f"{markdown.TITLES.get(title, title)}, {head}" if len(sources) > 1 else head))
+            heads.append((f"{title}/{key}", f"{markdown.title(title)}, {head}" if len(sources) > 1 else head))
             for name, row in found.items():
                 rows[name] |= {first[0]: markdown.cell(row, first[0]), f"{title}/{key}": markdown.cell(row, key)}
     if only:

@@ -24,7 +24,7 @@ HEADINGS = {
     "total_cpu_seconds": "CPU s",
     "total_seconds": "seconds",
     "held_out": "held-out loss",
-    "turned": "camera turned by",
+    "turned": "turned by",
     "peak_memory": "peak memory, MB",
 }
 TITLES = {"country-kitchen": "Country Kitchen", "white-room": "White Room"}
@@ -60,6 +60,10 @@ def short(value, error=0.0):
     return f"{value:,.{min(digits, 2 if abs(value) >= 0.1 else digits)}f}"
 
 
+def is_ratio(key):
+    return "gain" in key or "over" in key or key == "published"
+
+
 def cell(row, key):
     value = row.get(key)
     if key == "method":
@@ -67,8 +71,15 @@ def cell(row, key):
     if value is None:
         return "never" if key == "pays_after" and key in row else "–"
     if isinstance(value, (list, tuple)):
-        return pair(*value)
+        return pair(*value) if value[1] > 0 or not is_ratio(key) else f"{value[0]:.2f}"
+    if isinstance(value, float) and is_ratio(key):
+        return f"{value:.2f}"
     return value if isinstance(value, str) else number(value)
+
+
+def title(table):
+    """Of a table that is named after its scene, `60-s-country-kitchen`."""
+    return next((words for scene, words in TITLES.items() if table.endswith(scene)), table)
 
 
 def heading(key):
