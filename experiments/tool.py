@@ -136,7 +136,7 @@ def compare(label, scene, methods, **options):
     run(label, "compare", scene, "--methods", ",".join(map(str, methods)), "--report", folder, *arguments(options, methods=methods))
     with open(folder / "results.json", encoding="utf-8") as file:
         results = json.load(file)["results"]
-    runs = int(SETTINGS.overrides.get("runs", options.get("runs", 1)))
+    runs = int(SETTINGS.overrides.get("runs", options["runs"])) if "runs" in options else 1
     if len(results) < len(methods) * runs or any(run["spp"] < spp_of(options) for run in results):
         (folder / "compare.json").unlink()
         sys.exit(f"{label}: interrupted; the same command goes on with it")
