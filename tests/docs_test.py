@@ -12,8 +12,7 @@ import subprocess
 import sys
 import unittest
 
-ROOT = pathlib.Path(sys.argv.pop() if len(sys.argv) > 1 else __file__).resolve()
-ROOT = ROOT if ROOT.is_dir() else ROOT.parents[1]
+ROOT = pathlib.Path(sys.argv.pop() if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]).resolve()
 WIDTH, WORDS = 120, 60
 ITEM = re.compile(r"\s*([-*]|\d+\.) ")
 
