@@ -11,7 +11,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "experiments"))
-from records import machine  # noqa: E402
+from records import machine
 
 SIZE = "320x180"
 #: Whom the tracer is compared with; the version that tests/mitsuba checks images against.

@@ -7,8 +7,8 @@
 A page says between comments what it wants, and gets it:
 
   <!-- table: NAME/TABLE, ... | key, ... | only ROW; ... -->  ...  <!-- end -->
-      Columns by the keys of the rows (`key as Heading` for another heading; a comma in a key is \\,), of all rows or some. Tables of several scenes stand side by
-      side. Build, machine and command follow.
+      Columns by the keys of the rows (`key as Heading` for another heading; a comma in a key is \\,), of all rows or some. Tables of
+      several scenes stand side by side. Build, machine and command follow.
   <!-- text: words with {NAME/TABLE | ROW | key} among them -->  ...  <!-- end -->
       The same with figures.
 
@@ -25,11 +25,11 @@ import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "experiments"))
-import markdown  # noqa: E402
+import markdown
 
 WIDTH = 120
 MARKER = re.compile(r"(<!-- (table|text): (.*?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
-#: Paragraphs that a table ends with have this before them.
+#: What stands below a table.
 CAPTION = "{commands}{settings}; build {build} of {date}, {machine}."
 
 
@@ -48,7 +48,7 @@ def rows_at(place):
     """The record, the table's name, and its rows by their names."""
     name, _, title = place.strip().partition("/")
     found = record(name)
-    title = title or (list(found["tables"])[0] if len(found["tables"]) == 1 else "")
+    title = title or (next(iter(found["tables"])) if len(found["tables"]) == 1 else "")
     if title not in found["tables"]:
         sys.exit(f"{place}: docs/results/{name}.json has {', '.join(found['tables'])}")
     return found, title, {name_of(row): row for row in found["tables"][title]}

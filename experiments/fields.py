@@ -36,9 +36,10 @@ def gains_of(found, spp=None):
         for objective, results in by_objective.items():
             then = at_spp(results, spp) if spp else results
             none = of_method(then, "none")
-            for method in methods_of(then):
+            for method in methods_of(then)[1:]:  # without `none`
                 runs = of_method(then, method)
-                row = {"method": method, "label": f"`--objective {objective}`", "runs": len(runs), "spp": measured(runs, "spp"), "none_spp": measured(none, "spp")}
+                row = {"method": method, "label": f"`--objective {objective}`", "runs": len(runs)}
+                row |= {"spp": measured(runs, "spp"), "none_spp": measured(none, "spp")}
                 row |= {key: measured(runs, key) for key in ("mse", "relmse")}
                 row |= {f"{key}_gain": gain(none, runs, key) for key in ("mse", "relmse")}
                 tables[name].append(row)

@@ -4,7 +4,7 @@ import math
 
 from plot import line_chart
 from records import write_record
-from tables import gain, mean, of_method, rows_of, standard_error
+from tables import gain, mean, of_method, standard_error
 from tool import compare, folder_of, render_reference, train, turned_scene
 
 ANGLES = (10, 45, 90)
