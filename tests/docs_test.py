@@ -39,7 +39,8 @@ def paragraphs(text):
         if not line.strip() or ITEM.match(line):
             if words:
                 yield first, words
-            first, words = number, []
+            words = []
+        first = first if words else number
         words += ITEM.sub("", line).split()
 
 
