@@ -71,8 +71,10 @@ def cell(row, key):
     if value is None:
         return "never" if key == "pays_after" and key in row else "–"
     if isinstance(value, (list, tuple)):
-        return pair(*value) if value[1] > 0 or not is_ratio(key) else f"{value[0]:.2f}"
-    if isinstance(value, float) and is_ratio(key):
+        if value[1] > 0:
+            return pair(*value)
+        value = value[0]
+    if isinstance(value, float) and is_ratio(key) and value < 1:
         return f"{value:.2f}"
     return value if isinstance(value, str) else number(value)
 
