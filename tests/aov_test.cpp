@@ -53,10 +53,10 @@ class Aovs : public testing::Test {
  protected:
   ImageFile render(const std::string& aov) {
     RenderCommand command;
-    command.common.scene = m_files.write("scene.xml", kScene);
-    command.common.quiet = true;
+    command.scene.file = m_files.write("scene.xml", kScene);
+    command.process.quiet = true;
     command.render.spp = 1;
-    command.render.aov = aov;
+    command.aov = aov;
     command.output = m_files.folder() / "image.exr";
     run(command);
     return read_image(command.output);

@@ -66,7 +66,7 @@ ImageEstimate render_field(Sampler sampler, const std::vector<int>& passes, std:
   std::shared_ptr<const Field> field;
   for (const int spp : passes) {
     estimator.add_guided_pass(spp, {field.get(), &learner, Objective::mse});
-    field = learner.fit();
+    field = learner.fit_field();
   }
   return estimator.develop_rest();
 }
@@ -75,10 +75,9 @@ std::shared_ptr<const Proposal> conditional_tree(const Layout& layout) {
   settings.seed = 4;
   settings.examples = 16384;
   settings.alpha = 4;
-  settings.family = "kdtree";
-  settings.uniform = 0.3;
+  settings.uniform_share = 0.3;
   const PathIntegrand integrand(box_tracer(), layout, 5);
-  return train(gather_candidates(integrand, layout, 5, 65536), settings, nullptr).proposal;
+  return fit(joint_family("kdtree"), gather_candidates(integrand, layout, 5, 65536), settings).proposal;
 }
 
 const Spread& plain() {

@@ -11,7 +11,7 @@
 #include "estimate/image_estimator.h"
 #include "family/fit.h"
 #include "integrand/path_integrand.h"
-#include "render/method.h"
+#include "render/renderer.h"
 #include "train/candidates.h"
 
 namespace warpath {
@@ -43,11 +43,10 @@ TrainSettings short_training() {
 
 std::shared_ptr<const Proposal> trained(const std::string& family, const Layout& layout, double uniform) {
   TrainSettings settings = short_training();
-  settings.family = family;
-  settings.uniform = uniform;
+  settings.uniform_share = uniform;
   const PathIntegrand integrand(shared_tracer(), layout, kSeed + 1);
   const auto count = static_cast<std::uint64_t>(static_cast<double>(settings.examples) * settings.alpha);
-  return train(gather_candidates(integrand, layout, kSeed + 1, count), settings, nullptr).proposal;
+  return fit(joint_family(family), gather_candidates(integrand, layout, kSeed + 1, count), settings).proposal;
 }
 
 /// Mean luminance of the four quarters of an image, and of all of it.
@@ -146,13 +145,12 @@ INSTANTIATE_TEST_SUITE_P(Families, Unbiased,
 ImageEstimate render_with_candidates(std::uint64_t seed) {
   TrainSettings settings = short_training();
   settings.seed = seed;
-  MethodTrainer trainer(shared_tracer(), settings, {}, true, std::nullopt);
-  const Method method = parse_method("kdtree:film+bounce1");
-  const PreparedMethod prepared = trainer.prepare(method);
-  ImageEstimator estimator(tracer(), method.layout, prepared.proposal, seed);
-  prepared.add_candidates(estimator);
-  estimator.add_pass(12);
-  return estimator.develop();
+  settings.candidates_count = true;
+  RenderSettings render;
+  render.seed = seed;
+  render.spp = 12;
+  Renderer renderer(shared_tracer());
+  return renderer.render(parse_method("kdtree:film+bounce1"), render, settings, "").estimator->develop();
 }
 
 TEST(TrainingSamples, ThatCountKeepTheMean) {

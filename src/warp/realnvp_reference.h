@@ -25,8 +25,9 @@ class Reference {
       for (const int k : coupling.kept) {
         const double edge = static_cast<double>(kEdge), x = std::clamp(v[static_cast<std::size_t>(k)], -edge, edge);
         inputs.push_back(x);
-        for (int bin = 0; bin < m_flow.settings().bins; ++bin) {
-          const double t = (m_flow.settings().bins / (1 + std::exp(-x)) - bin - 0.5) / static_cast<double>(kBlobRadius);
+        for (int bin = 0; bin < m_flow.settings().encoding_bins; ++bin) {
+          const double t =
+              (m_flow.settings().encoding_bins / (1 + std::exp(-x)) - bin - 0.5) / static_cast<double>(kBlobRadius);
           inputs.push_back(std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0);
         }
       }

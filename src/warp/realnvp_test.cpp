@@ -7,7 +7,6 @@
 #include "core/rng.h"
 #include "core/tensor_file.h"
 #include "warp/check.h"
-#include "warp/load.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -99,7 +98,7 @@ TEST_P(RealNvpTest, ComesBackFromAFile) {
   const auto warp = bent(std::get<0>(GetParam()), small(std::get<1>(GetParam())));
   TensorFile file;
   warp->save(file, "a.");
-  const auto loaded = std::dynamic_pointer_cast<const RealNvp>(load_proposal(file, "a."));
+  const auto loaded = RealNvp::load(file, "a.");
   ASSERT_TRUE(loaded);
   EXPECT_EQ(loaded->parameters(), warp->parameters());
   EXPECT_EQ(loaded->settings().couplings, warp->settings().couplings);
@@ -129,10 +128,10 @@ TEST(RealNvp, BatchStatisticsAreStored) {
   const auto warp = bent(3, small(false, RealNvpSettings::Norm::batch));
   TensorFile file;
   warp->save(file, "");
-  EXPECT_EQ(std::dynamic_pointer_cast<const RealNvp>(load_proposal(file, ""))->parameters(), warp->parameters());
+  EXPECT_EQ(RealNvp::load(file, "")->parameters(), warp->parameters());
   const std::vector<float> negative(16, -1.0f);
   file.put<float>("coupling0.s.layer0.variance", {16}, negative);
-  EXPECT_THROW(load_proposal(file, ""), FileError);
+  EXPECT_THROW(RealNvp::load(file, ""), FileError);
 }
 
 TEST(RealNvp, BrokenFilesAreErrors) {
@@ -141,7 +140,7 @@ TEST(RealNvp, BrokenFilesAreErrors) {
   const auto broken = [&](const auto& change) {
     TensorFile file = good;
     change(file);
-    EXPECT_THROW(load_proposal(file, "w."), FileError);
+    EXPECT_THROW(RealNvp::load(file, "w."), FileError);
   };
   broken([](TensorFile& f) { f.metadata()["w.couplings"] = "5"; });
   broken([](TensorFile& f) { f.metadata()["w.couplings"] = "0"; });
@@ -153,7 +152,7 @@ TEST(RealNvp, BrokenFilesAreErrors) {
     const std::vector<float> nan(1, NAN);
     f.put<float>("w.coupling0.scale", {1}, nan);
   });
-  EXPECT_NO_THROW(load_proposal(good, "w."));
+  EXPECT_NO_THROW(RealNvp::load(good, "w."));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include "core/rng.h"
 #include "core/tensor_file.h"
 #include "warp/check.h"
-#include "warp/load.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -107,7 +106,7 @@ TEST_P(SplineTest, ComesBackFromAFile) {
     const auto warp = bent(GetParam(), settings);
     TensorFile file;
     warp->save(file, "a.");
-    const auto loaded = std::dynamic_pointer_cast<const Spline>(load_proposal(file, "a."));
+    const auto loaded = Spline::load(file, "a.");
     ASSERT_TRUE(loaded);
     EXPECT_EQ(loaded->parameters(), warp->parameters());
     EXPECT_EQ(loaded->settings().bins, warp->settings().bins);
@@ -180,7 +179,7 @@ TEST(Spline, BrokenFilesAreErrors) {
   const auto broken = [&](const auto& change) {
     TensorFile file = good;
     change(file);
-    EXPECT_THROW(load_proposal(file, "w."), FileError);
+    EXPECT_THROW(Spline::load(file, "w."), FileError);
   };
   broken([](TensorFile& f) { f.metadata()["w.couplings"] = "5"; });
   broken([](TensorFile& f) { f.metadata()["w.couplings"] = "0"; });
@@ -194,7 +193,7 @@ TEST(Spline, BrokenFilesAreErrors) {
     const std::vector<float> nan(16, NAN);
     f.put<float>("w.coupling0.layer0.bias", {16}, nan);
   });
-  EXPECT_NO_THROW(load_proposal(good, "w."));
+  EXPECT_NO_THROW(Spline::load(good, "w."));
 }
 
 }  // namespace

@@ -75,10 +75,21 @@ std::shared_ptr<const Mixture> mixture_of_all(int dims) {
       {uneven_grid(dims, 7), 2}, {random_tree(dims, 50), 5}, {std::make_shared<Uniform>(dims), 1}});
 }
 
+/// Loads what the tests here store; the registry of families, which loads all, is no part of this folder.
+std::shared_ptr<const Proposal> load_any(const TensorFile& file, const std::string& prefix) {
+  const std::string& family = file.meta(prefix + "family");
+  if (family == "uniform") return Uniform::load(file, prefix);
+  if (family == "grid") return Grid::load(file, prefix);
+  if (family == "kdtree") return KdTree::load(file, prefix);
+  if (family == "chain") return Chain::load(file, prefix, load_any);
+  if (family == "mixture") return Mixture::load(file, prefix, load_any);
+  fail_load(file, prefix, "unknown family");
+}
+
 std::shared_ptr<const Proposal> stored_and_loaded(const Proposal& proposal) {
   TensorFile file;
   proposal.save(file, "a.");
-  return load_proposal(file, "a.");
+  return load_any(file, "a.");
 }
 
 /// The same numbers to the last bit.
@@ -136,11 +147,11 @@ TEST(Grid, BrokenFilesAreRefused) {
   TensorFile file;
   Grid(2, 4).save(file, "a.");
   file.put<double>("a.edges", {2, 3}, std::vector<double>{0, 0.5, 1, 0, 1, 1});
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
   file.put<double>("a.edges", {2, 3}, std::vector<double>{0, NAN, 1, 0, 0.5, 1});
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
   file.put<double>("a.edges", {6}, std::vector<double>{0, 0.5, 1, 0, 0.5, 1});
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
 }
 
 TEST(Chain, KeepsEveryPromise) {
@@ -168,11 +179,11 @@ TEST(Chain, BrokenFilesAreRefused) {
   Chain(uneven_grid(2, 5), uneven_grid(2, 7)).save(file, "a.");
   TensorFile nested = file, other = file, mixture = file;
   nested.metadata()["a.inner.family"] = "chain";
-  EXPECT_THROW(load_proposal(nested, "a."), FileError);
+  EXPECT_THROW(load_any(nested, "a."), FileError);
   Grid(3, 4).save(other, "a.inner.");
-  EXPECT_THROW(load_proposal(other, "a."), FileError);
+  EXPECT_THROW(load_any(other, "a."), FileError);
   mixture_of_all(2)->save(mixture, "a.outer.");
-  EXPECT_THROW(load_proposal(mixture, "a."), FileError) << "a mixture is no bijection";
+  EXPECT_THROW(load_any(mixture, "a."), FileError) << "a mixture is no bijection";
 }
 
 TEST(KdTree, KeepsEveryPromise) {
@@ -279,15 +290,15 @@ TEST(Mixture, HostileFilesAreRefused) {
   TensorFile file;
   mixture_of_all(2)->save(file, "a.");
   file.metadata()["a.component0.family"] = "mixture";
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
   file.metadata()["a.component0.family"] = "grdi";
-  EXPECT_THAT([&] { load_proposal(file, "a."); },
+  EXPECT_THAT([&] { load_any(file, "a."); },
               testing::ThrowsMessage<FileError>(testing::HasSubstr("did you mean \"grid\"?")));
   file.metadata()["a.component0.family"] = "grid";
   file.metadata()["a.component0.dims"] = "3";
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
   file.metadata()["a.dims"] = "2x";
-  EXPECT_THROW(load_proposal(file, "a."), FileError);
+  EXPECT_THROW(load_any(file, "a."), FileError);
 }
 
 }  // namespace
