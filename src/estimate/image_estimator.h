@@ -7,7 +7,10 @@
 
 #include "core/ordered.h"
 #include "estimate/allocation.h"
+#include "estimate/emission_estimator.h"
 #include "estimate/film.h"
+#include "estimate/path_batch.h"
+#include "estimate/sample_numbering.h"
 #include "path/latents.h"
 #include "path/layout.h"
 #include "path/vertex_recorder.h"
@@ -84,23 +87,25 @@ class ImageEstimator {
   Sampler sampler() const { return m_sampler; }
 
  private:
+  /// A pass of these samples with what the estimator itself brings: nothing that guides.
+  PathPass unguided(const SampleNumbering& numbering) const;
+  /// Traces a pass, and merges its batches into the film and with `also`, in their order.
+  void add_paths(const PathPass& pass, const std::function<void(const PathBatch&)>& also, const Progress& progress,
+                 const std::function<bool()>& stop);
   void add_uniform_samples(ImageEstimate& image) const;
-  void add_paths(int spp, const Guidance* guidance, const Progress& progress, const std::function<bool()>& stop);
 
   const Tracer& m_tracer;
   Layout m_layout;
   std::shared_ptr<const Proposal> m_proposal;
   std::uint64_t m_seed;
   Sampler m_sampler;
-  bool m_joint;                                  // the film is among the warped dimensions
-  std::vector<std::uint32_t> m_pixels;           // in the order in which they are rendered: compact tiles
-  std::vector<std::uint32_t> m_emission_pixels;  // whose filter may reach an emitter
+  bool m_joint;                         // the film is among the warped dimensions
+  std::vector<std::uint32_t> m_pixels;  // in the order in which they are rendered
+  BegunSamples m_begun;
   Film m_film;
-  std::optional<Film> m_emission, m_uniform;
+  EmissionEstimator m_emission;
+  std::optional<Film> m_uniform;
   std::optional<PixelMoments> m_moments, m_pass_moments;  // of all guided passes, and of the last
-  std::vector<std::uint32_t> m_begun;  // samples begun so far in each pixel: numbers them; not of a warped film
-  int m_passes_spp = 0;                // samples per pixel begun so far on average
-  std::uint64_t m_emission_rays = 0;
   RenderCost m_cost;
 };
 
