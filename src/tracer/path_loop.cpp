@@ -76,9 +76,8 @@ void PathLoop::start(float* film_x, float* film_y) {
 // Camera rays pass through the shapes of emitters until they meet another surface.
 void PathLoop::skip_emitters() {
   Workspace& w = m_work;
-  RayStream& rays = w.shadow_rays;  // both are free here
-  HitStream hits{w.light.u0,    w.light.u1,       w.light.inv_q,  w.light_uv.u0,
-                 w.light_uv.u1, w.light_uv.inv_q, w.subset_lanes, w.shadow_vertex};
+  const RayStream& rays = w.passing_rays;
+  const HitStream& hits = w.passing_hits;
   const auto on_emitter = [&](std::uint32_t shape) { return shape != kNoHit && m_scene.surfaces.emitter(shape) >= 0; };
   SurfacePoint point;
   for (;;) {
@@ -89,12 +88,12 @@ void PathLoop::skip_emitters() {
       const Vec3 position = m_scene.surfaces.at(w.hits, i, w.rays, point);
       w.rays.set(i, offset_point(position, point.ng, d), d, kEndless, w.rays.time[i]);
       rays.set(count, w.rays.origin(i), d, kEndless, w.rays.time[i]);
-      w.subset[count++] = static_cast<std::uint32_t>(i);
+      w.passing[count++] = static_cast<std::uint32_t>(i);
     }
     if (count == 0) return;
     m_scene.embree.intersect(rays, count, hits, false);
     for (std::size_t k = 0; k < count; ++k) {
-      const std::uint32_t i = w.subset[k];
+      const std::uint32_t i = w.passing[k];
       w.hits.t[i] = hits.t[k];
       w.hits.u[i] = hits.u[k], w.hits.v[i] = hits.v[k];
       w.hits.nx[i] = hits.nx[k], w.hits.ny[i] = hits.ny[k], w.hits.nz[i] = hits.nz[k];

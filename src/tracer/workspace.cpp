@@ -38,6 +38,9 @@ void Workspace::resize(std::size_t n) {
   const auto ray_stream = [&] {
     return RayStream{floats(), floats(), floats(), floats(), floats(), floats(), floats(), floats()};
   };
+  const auto hit_stream = [&] {
+    return HitStream{floats(), floats(), floats(), floats(), floats(), floats(), indices(), indices()};
+  };
   const auto numbers = [&] { return DrawnNumbers{floats(), floats(), floats()}; };
   const auto contexts = [&] {
     ContextArrays arrays;
@@ -54,7 +57,7 @@ void Workspace::resize(std::size_t n) {
   straight = bytes();
   lanes = indices();
   rays = ray_stream();
-  hits = {floats(), floats(), floats(), floats(), floats(), floats(), indices(), indices()};
+  hits = hit_stream();
   vertex_lanes = indices(), vertex_hit = indices(), slot = indices(), rank = indices();
   smooth = bytes();
   order = indices();
@@ -78,6 +81,9 @@ void Workspace::resize(std::size_t n) {
   shadow_vertex = indices();
   shadow_light = vectors();
   shadowed = bytes();
+  passing = indices();
+  passing_rays = ray_stream();
+  passing_hits = hit_stream();
 }
 
 }  // namespace warpath

@@ -32,7 +32,7 @@ class Arena {
   void* next();
 
   // With the pad, arrays of a power-of-two length do not all fall into the same cache sets.
-  static constexpr std::size_t kArrays = 148;
+  static constexpr std::size_t kArrays = 164;
   std::size_t m_stride = 0, m_used = 0, m_capacity = 0;
   std::unique_ptr<float[]> m_memory;
 };
@@ -108,6 +108,11 @@ struct Workspace {
   std::uint32_t* shadow_vertex;
   Vec3Array shadow_light;  ///< what arrives if nothing is in between, over the throughput of the path
   std::uint8_t* shadowed;
+
+  // One entry per camera ray that goes on beyond a hidden emitter.
+  std::uint32_t* passing;  ///< its ray
+  RayStream passing_rays;
+  HitStream passing_hits;
 
  private:
   Arena m_arena;
