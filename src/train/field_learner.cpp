@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "warpath/error.h"
 
@@ -16,16 +15,6 @@ constexpr std::uint16_t kNoBin = 0xffff;
 constexpr std::size_t kKinds = 6;  // of surfaces, see SurfaceKind
 
 constexpr std::size_t kFeatures = FieldTree::kFeatures;
-
-/// In the choice of a share of uniform numbers a draw counts at most as if it were so many times the mean.
-constexpr double kOutshines = 20;
-/// Effective samples of a cell that weigh as much as what the cells like it say.
-constexpr double kLikeOthers = 64;
-
-/// A difference between the halves of a node is believed as far as its chi-squared, of one degree of freedom, exceeds
-/// this: the positive part of the estimator of James and Stein [JS61], with a bound that chance passes in 1 of 20
-/// nodes.
-constexpr double kByChance = 4;
 
 /// Effective samples of a cell over all of them, where a field does not tell: a typical share.
 constexpr double kEffective = 0.1;
@@ -119,7 +108,7 @@ void FieldLearner::start_from(const Field& field) {
   for (std::uint32_t c = 0; c < m_tree.cells(); ++c) {
     Cell& cell = m_cells[c];
     cell.kind = field.kind(c);
-    const auto take = [&](VertexDecision which, Draws& draws, std::span<Bin> bins) {
+    const auto take = [&](VertexDecision which, CellDraws& draws, std::span<CellBin> bins) {
       const auto& [mean, learned] = field.returns(which, c);
       draws.learned = learned;
       if (!(learned > 0)) return;
@@ -139,24 +128,6 @@ void FieldLearner::start_from(const Field& field) {
     take(VertexDecision::scattering, cell.scatter,
          std::span(m_scatter).subspan(c * m_grids.diffuse.bins(), m_grids.diffuse.bins()));
   }
-}
-
-void FieldLearner::Draws::add(float term, float inv_q, float inv_own) {
-  if (learned > 0) {
-    // A draw that outshines all others would choose alone.
-    const float bound = n > 0 ? static_cast<float>(kOutshines * sum / n) : 0.0f;
-    const float f = std::min(term, bound);
-    // The field's own q is 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other
-    // share.
-    const float q = 1 / inv_q, beyond_1 = std::max((1 / inv_own - 1) / learned, -1.0f);
-    for (std::size_t s = 0; s < kUniform.size(); ++s) with_share[s] += f * f * q / (1 + (1 - kUniform[s]) * beyond_1);
-  }
-  n += 1, sum += term, square += static_cast<double>(term) * term;
-}
-
-void FieldLearner::Draws::halve() {
-  n *= 0.5, sum *= 0.5, square *= 0.5;
-  for (float& square_with : with_share) square_with *= 0.5f;
 }
 
 std::unique_ptr<VertexRecorder> FieldLearner::make_recorder() const { return make_recorder(nullptr); }
@@ -200,12 +171,12 @@ void FieldLearner::merge(VertexRecorder& recorder) {
       cell.square[k] += static_cast<double>(e.at[k]) * e.at[k];
     }
     if (e.light_bin != kNoBin) {
-      Bin& bin = m_light[e.cell * light_bins + e.light_bin];
+      CellBin& bin = m_light[e.cell * light_bins + e.light_bin];
       bin.sum += e.light;
       bin.draws += 1;
       cell.light.add(e.light, e.inv_q_light, e.inv_own_light);
     }
-    Bin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
+    CellBin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
     bin.sum += e.scatter;
     bin.draws += 1;
     cell.scatter.add(e.scatter, e.inv_q_scatter, e.inv_own_scatter);
@@ -245,10 +216,10 @@ bool FieldLearner::cut(std::uint32_t index, double extent2) {
   if (!(width(feature) > 1e-9 * extent2)) return false;  // all in one place
 
   const std::uint32_t upper = m_tree.split(index, feature, static_cast<float>(mean[feature]));
-  const auto halve = [&](std::vector<Bin>& bins, std::size_t size) {
+  const auto halve = [&](std::vector<CellBin>& bins, std::size_t size) {
     bins.resize(bins.size() + size);
     for (std::size_t b = 0; b < size; ++b) {
-      Bin& bin = bins[index * size + b];
+      CellBin& bin = bins[index * size + b];
       bin.sum *= 0.5f, bin.draws *= 0.5f;
       bins[upper * size + b] = bin;
     }
@@ -273,101 +244,41 @@ bool FieldLearner::cut(std::uint32_t index, double extent2) {
   return true;
 }
 
-FieldLearner::ByShare FieldLearner::pool(SurfaceKind kind, Draws Cell::*draws) const {
-  ByShare pooled{};
-  double weights = 0;
-  for (const Cell& cell : m_cells) {
-    const Draws& d = cell.*draws;
-    const double whole = std::accumulate(d.with_share.begin(), d.with_share.end(), 0.0);
-    if (cell.kind != kind || !(whole > 0)) continue;
-    const double weight = d.effective();
-    weights += weight;
-    for (std::size_t s = 0; s < pooled.size(); ++s) pooled[s] += weight * d.with_share[s] / whole;
-  }
-  for (double& p : pooled) p /= std::max(weights, 1.0);
-  return pooled;
-}
-
-double FieldLearner::best_uniform(const Draws& draws, const ByShare& pooled) const {
-  const double whole = std::accumulate(draws.with_share.begin(), draws.with_share.end(), 0.0);
-  const double weight = whole > 0 ? draws.effective() / whole : 0;
-  double least = HUGE_VAL, best = m_settings.first_uniform_share;
-  for (std::size_t s = 0; s < pooled.size(); ++s) {
-    const double square = weight * draws.with_share[s] + kLikeOthers * pooled[s];
-    if (square > 0 && square < least) least = square, best = kUniform[s];
-  }
-  return best;
-}
-
-void FieldLearner::fit_density(const HalvingGrid& grid, std::span<const Bin> bins, double uniform, Draws& all,
-                               CumulativeProbability* density) const {
-  const std::uint32_t count = grid.bins();
-  static thread_local std::vector<double> found, drawn, volume, expected;
-  static thread_local std::vector<float> masses;
-  for (auto* heap : {&found, &drawn, &volume, &expected}) heap->resize(2 * count);
-  masses.resize(count);
-  for (std::uint32_t b = 0; b < count; ++b) {
-    found[count + b] = bins[b].sum;
-    drawn[count + b] = bins[b].draws;
-    volume[count + b] = grid.volume(b);
-  }
-  for (std::uint32_t node = count - 1; node > 0; --node)
-    for (auto* heap : {&found, &drawn, &volume}) (*heap)[node] = (*heap)[2 * node] + (*heap)[2 * node + 1];
-  // Each half is drawn to the whole that it is part of, the more the fewer samples it has seen, unless the two halves
-  // differ by more than chance would have it: light through a gap stands out after a few hits. A hit is the f / q that
-  // a typical unit of light comes with; hits of the halves, if these were alike, would be binomial.
-  const double hit = all.sum > 0 ? all.square / all.sum : 1;
-  expected[1] = all.n > 0 ? found[1] / all.n : 0;
-  double sum = 0;
-  for (std::uint32_t node = 2; node < 2 * count; ++node) {
-    const double whole = expected[node / 2];
-    const double own = volume[node] > 0 && all.n > 0 ? found[node] / (all.n * volume[node]) : 0;
-    double belief = drawn[node] / (drawn[node] + m_settings.shrink);
-    const double hits = found[node / 2] / hit, alike = volume[node] / volume[node / 2];
-    if (hits > 0 && alike > 0 && alike < 1) {
-      const double difference = found[node] / found[node / 2] - alike;
-      const double chi_squared = hits * difference * difference / (alike * (1 - alike));
-      if (chi_squared > kByChance) belief = std::max(belief, 1 - kByChance / chi_squared);
-    }
-    expected[node] = belief * own + (1 - belief) * whole;
-    if (node >= count) sum += expected[node] * volume[node];
-  }
-  const double effective = all.effective();
-  const double share = sum > 0 ? (1 - uniform) * effective / (effective + m_settings.trust) : 0;
-  all.learned = static_cast<float>(share);
-  // The density will be a better one: what was drawn with it will soon count more.
-  for (float& square_with : all.with_share) square_with *= 0.5f;
-  for (std::uint32_t b = 0; b < count; ++b)
-    masses[b] =
-        static_cast<float>(volume[count + b] * (1 - share + (share > 0 ? share * expected[count + b] / sum : 0)));
-  grid.set_density(masses, density);
-}
-
 std::shared_ptr<const Field> FieldLearner::fit_field() {
   if (!m_cells.empty()) cut_cells();
   m_tree_of_pass = std::make_shared<const FieldTree>(m_tree);
   const std::size_t light_bins = m_grids.light.bins(), scatter_bins = m_grids.diffuse.bins();
   const std::size_t light_stored = m_grids.light.stored(), scatter_stored = m_grids.diffuse.stored();
   std::vector<CumulativeProbability> light(m_cells.size() * light_stored), scatter(m_cells.size() * scatter_stored);
-  std::array<ByShare, kKinds> pooled_light, pooled_scatter;
-  for (std::size_t k = 0; k < kKinds; ++k) {
-    pooled_light[k] = pool(static_cast<SurfaceKind>(k), &Cell::light);
-    pooled_scatter[k] = pool(static_cast<SurfaceKind>(k), &Cell::scatter);
+  std::array<PooledShares, kKinds> light_shares, scatter_shares;
+  for (const Cell& cell : m_cells) {
+    light_shares[static_cast<std::size_t>(cell.kind)].add(cell.light);
+    scatter_shares[static_cast<std::size_t>(cell.kind)].add(cell.scatter);
   }
+  const auto fit_density = [&](const HalvingGrid& grid, std::span<const CellBin> bins, const PooledShares& like,
+                               CellDraws& draws, CumulativeProbability* density) {
+    static thread_local std::vector<float> masses;
+    masses.resize(grid.bins());
+    const double uniform = best_uniform_share(draws, like.mean(), m_settings.first_uniform_share);
+    draws.begin_pass(fit_cell_density(grid, bins, draws, {m_settings.shrink, m_settings.trust, uniform}, masses));
+    grid.set_density(masses, density);
+  };
   tbb::parallel_for(std::size_t{0}, m_cells.size(), [&](std::size_t c) {
     Cell& cell = m_cells[c];
     const auto kind = static_cast<std::size_t>(cell.kind);
-    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins),
-                best_uniform(cell.light, pooled_light[kind]), cell.light, light.data() + c * light_stored);
+    fit_density(m_grids.light, std::span(m_light).subspan(c * light_bins, light_bins), light_shares[kind], cell.light,
+                light.data() + c * light_stored);
     fit_density(m_grids.grid(VertexDecision::scattering, cell.kind),
-                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins),
-                best_uniform(cell.scatter, pooled_scatter[kind]), cell.scatter, scatter.data() + c * scatter_stored);
+                std::span(m_scatter).subspan(c * scatter_bins, scatter_bins), scatter_shares[kind], cell.scatter,
+                scatter.data() + c * scatter_stored);
   });
   std::vector<SurfaceKind> kinds;
   std::vector<Field::Returns> returns;
   for (const Cell& cell : m_cells) {
     kinds.push_back(cell.kind);
-    const auto told = [](const Draws& draws) { return Field::Return{static_cast<float>(draws.mean()), draws.learned}; };
+    const auto told = [](const CellDraws& draws) {
+      return Field::Return{static_cast<float>(draws.mean()), draws.learned};
+    };
     returns.push_back({told(cell.light), told(cell.scatter)});
   }
   return std::make_shared<Field>(m_tree, m_grids, std::move(kinds), std::move(light), std::move(scatter),
