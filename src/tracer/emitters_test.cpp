@@ -73,7 +73,7 @@ Matrix4 tilted() {
   return m;
 }
 
-std::vector<LightCase> light_cases() {
+std::vector<LightCase> flat_lights() {
   return {
       {"rectangle",
        [](SceneBuilder& b) {
@@ -99,6 +99,10 @@ std::vector<LightCase> light_cases() {
        [](SceneBuilder& b) {
          b.light(SceneBuilder::grid(4, facing({0, 0, 1}, {0, 0, -1}, 1)), b.diffuse(Color(0.0f)), picture(b));
        }},
+  };
+}
+std::vector<LightCase> curved_lights() {
+  return {
       {"disk",
        [](SceneBuilder& b) {
          const Matrix4 m = scale({1.5f, 0.7f, 1}) * facing({0.3f, 0, 2}, {0, 0, -1}, 1);
@@ -121,6 +125,10 @@ std::vector<LightCase> light_cases() {
          const Matrix4 m = scale({0.5f, 0.5f, 2}) * tilted() * translate({1, -1, 1});
          b.light(Cylinder{{m, m}, false}, Color(1.0f));
        }},
+  };
+}
+std::vector<LightCase> environments_and_many() {
+  return {
       {"envmap",
        [](SceneBuilder& b) {
          b.emitter(EnvmapEmitter{sky(16, 8), 2, tilted()});
@@ -134,6 +142,10 @@ std::vector<LightCase> light_cases() {
          b.scene.emitters[0].sampling_weight = 3;
          b.scene.emitters[1].sampling_weight = 0.5f;
        }},
+  };
+}
+std::vector<LightCase> moving_lights() {
+  return {
       {"moving_rectangle",
        [](SceneBuilder& b) {
          b.light(Rectangle{{facing({-3, 0, 2}, {0, 0, -1}, 1), facing({1, 0, 2}, {0, 0, -1}, 1.5f)}, false},
@@ -159,6 +171,12 @@ std::vector<LightCase> light_cases() {
        {0, 0, 0},
        0.6f},
   };
+}
+std::vector<LightCase> light_cases() {
+  std::vector<LightCase> cases;
+  for (const auto& some : {flat_lights(), curved_lights(), environments_and_many(), moving_lights()})
+    cases.insert(cases.end(), some.begin(), some.end());
+  return cases;
 }
 
 class Lights : public ::testing::TestWithParam<LightCase> {};
