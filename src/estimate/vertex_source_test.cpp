@@ -13,6 +13,7 @@ class Expects final : public VertexProposal {
  public:
   explicit Expects(float expected) : m_expected(expected) {}
   std::string family() const override { return "expects"; }
+  const Layout& numbers() const override { return m_numbers; }
   void locate(const VertexContext&, std::size_t n, std::uint32_t* places) const override { std::fill_n(places, n, 0); }
   void sample(VertexDecision, const VertexContext&, const std::uint32_t*, std::size_t n,
               const std::array<const double*, 3>& z, const std::array<float*, 3>& y, float* inv_q) const override {
@@ -30,6 +31,7 @@ class Expects final : public VertexProposal {
   void save(TensorFile&, const std::string&) const override {}
 
  private:
+  Layout m_numbers;
   float m_expected;
 };
 
