@@ -1,20 +1,20 @@
 // The embedded path tracer as Python sees it. What people call is python/warpath/renderer.py.
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
-#include <nanobind/stl/optional.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <array>
-#include <chrono>
+#include <map>
 #include <memory>
 
 #include "arrays.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "family/training_options.h"
-#include "render/method.h"
-#include "render/render_loop.h"
+#include "render/render_options.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"
 
@@ -31,63 +31,48 @@ struct LoadedScene {
   const FilmSettings& film() const { return tracer->scene().film; }
 };
 
-LoadedScene load(const std::filesystem::path& file, std::vector<std::pair<std::string, std::string>> defines,
-                 std::pair<int, int> size, int max_depth, std::optional<std::array<int, 4>> crop) {
-  const nb::gil_scoped_release release;
-  check(max_depth >= 0, "max_depth is negative; 0 takes the scene's");
-  check(size.first >= 0 && size.second >= 0, "size is negative; (0, 0) takes the scene's");
-  SceneOptions options;
-  options.defines = std::move(defines);
-  options.width = size.first;
-  options.height = size.second;
-  options.max_depth = max_depth;
-  Scene scene = load_scene(file, options);
-  if (crop) {
-    const auto [x, y, width, height] = *crop;
-    FilmSettings& film = scene.film;
-    if (x < 0 || y < 0 || width < 1 || height < 1 || x + width > film.width || y + height > film.height)
-      throw ConfigError(fmt::format("crop: {}, {}, {}, {} is not inside the film of {}x{}", x, y, width, height,
-                                    film.width, film.height));
-    film.crop_x = x;
-    film.crop_y = y;
-    film.crop_width = width;
-    film.crop_height = height;
+using Texts = std::map<std::string, std::string>;
+
+/// Sets options by the rows of a table; names as in Python.
+void set_all(const std::vector<Option>& table, const Texts& options) {
+  for (const auto& [name, text] : options) {
+    std::string dashed = name;
+    std::replace(dashed.begin(), dashed.end(), '_', '-');
+    find_option(table, dashed).set(text, name);
   }
-  return {std::make_shared<const Tracer>(std::move(scene))};
+}
+
+LoadedScene load(const std::filesystem::path& file, std::vector<std::pair<std::string, std::string>> parameters,
+                 const Texts& options) {
+  const nb::gil_scoped_release release;
+  SceneRequest request{.file = file, .parameters = std::move(parameters)};
+  set_all(scene_option_table(request), options);
+  return {std::make_shared<const Tracer>(load_scene(request))};
 }
 
 /// What a render gave.
-struct Rendered {
+struct RenderedImage {
   ImageEstimate image;
   double spp = 0, seconds = 0;
   std::uint64_t non_finite = 0;
   std::string choice;
 };
 
-Rendered render(const LoadedScene& scene, const std::string& warp, int spp, std::optional<double> time,
-                const std::string& objective, const std::string& sampler, std::uint64_t seed,
-                const TrainingOptions& options) {
+RenderedImage render(const LoadedScene& scene, const std::string& warp, const Texts& options,
+                     const TrainingOptions& training) {
   const nb::gil_scoped_release release;
   const StopOnInterrupt stop;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch clock;
   const Method method = parse_method(warp);
-  const Sampler chosen = parse_sampler(sampler, method.layout);
-  Budget budget;
-  budget.spp = spp > 0 ? spp : scene.tracer->scene().sample_count;
-  if (time)
-    budget.deadline =
-        start + std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(*time));
-  MethodTrainer trainer(scene.tracer, options.train_settings(seed), options.init, options.use_samples(),
-                        parse_objective(objective));
-  PreparedMethod prepared = trainer.prepare(method);
-  ImageEstimator estimator(*scene.tracer, method.layout, prepared.proposal, seed, chosen);
-  prepared.add_candidates(estimator);
-  render_passes(estimator, budget, prepared.guide, {}, [] {});
+  RenderSettings settings;
+  set_all(render_option_table(settings), options);
+  training.check_used({method.trained_family()});
+  Renderer renderer(scene.tracer);
+  const Rendered rendered = renderer.render(method, settings, training.settings(settings.seed), "");
   // Python hears of Ctrl-C; half an image by mistake helps nobody there.
   if (g_interrupted) throw Interrupted{};
-  return {estimator.develop(), estimator.spp(),
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), estimator.non_finite(),
-          prepared.guide.choice};
+  const ImageEstimator& estimator = *rendered.estimator;
+  return {estimator.develop(), estimator.spp(), clock.wall(), estimator.non_finite(), rendered.choice};
 }
 
 /// A view that keeps its image alive.
@@ -117,31 +102,30 @@ NB_MODULE(_renderer, m) {
       .def_prop_ro("max_depth", [](const LoadedScene& self) { return self.tracer->scene().integrator.max_depth; })
       .def_prop_ro("emitters", [](const LoadedScene& self) { return self.tracer->emitters(); });
 
-  nb::class_<Rendered>(m, "Rendered", "See warpath.Image.")
+  nb::class_<RenderedImage>(m, "Rendered", "See warpath.Image.")
       .def_prop_ro("mean",
                    [](nb::handle self) {
-                     const auto& image = nb::cast<const Rendered&>(self).image;
+                     const auto& image = nb::cast<const RenderedImage&>(self).image;
                      return colours(self, image, image.mean);
                    })
       .def_prop_ro("variance",
                    [](nb::handle self) {
-                     const auto& image = nb::cast<const Rendered&>(self).image;
+                     const auto& image = nb::cast<const RenderedImage&>(self).image;
                      return colours(self, image, image.variance);
                    })
       .def_prop_ro("samples",
                    [](nb::handle self) {
-                     const auto& image = nb::cast<const Rendered&>(self).image;
+                     const auto& image = nb::cast<const RenderedImage&>(self).image;
                      const std::array<std::size_t, 2> shape{static_cast<std::size_t>(image.height),
                                                             static_cast<std::size_t>(image.width)};
                      return nb::ndarray<nb::numpy, const float, nb::ndim<2>>(image.samples.data(), 2, shape.data(),
                                                                              self);
                    })
-      .def_ro("spp", &Rendered::spp)
-      .def_ro("seconds", &Rendered::seconds)
-      .def_ro("non_finite", &Rendered::non_finite)
-      .def_ro("choice", &Rendered::choice);
+      .def_ro("spp", &RenderedImage::spp)
+      .def_ro("seconds", &RenderedImage::seconds)
+      .def_ro("non_finite", &RenderedImage::non_finite)
+      .def_ro("choice", &RenderedImage::choice);
 
-  m.def("load", load, "file"_a, "defines"_a, "size"_a, "max_depth"_a, "crop"_a.none());
-  m.def("render", render, "scene"_a, "warp"_a, "spp"_a, "time"_a.none(), "objective"_a, "sampler"_a, "seed"_a,
-        "options"_a);
+  m.def("load", load, "file"_a, "parameters"_a, "options"_a);
+  m.def("render", render, "scene"_a, "warp"_a, "options"_a, "training"_a);
 }

@@ -80,16 +80,17 @@ Trained train_on(const Candidates& candidates, const std::string& family, const 
                  std::uint64_t seed, const Trained* init) {
   const nb::gil_scoped_release release;
   const StopOnInterrupt stop;
-  TrainSettings settings = options.train_settings(seed);
-  settings.family = family;
-  Fit fit = train(candidates, settings, init ? &init->proposal() : nullptr);
+  const JointFamily& joint = joint_family(family);
+  options.check_used({family});
+  const TrainSettings settings = options.settings(seed);
+  Fit fit = warpath::fit(joint, candidates, settings, init ? &init->proposal() : nullptr);
   Trained trained;
   trained.log = std::move(fit.log);
   trained.file.proposal = std::move(fit.proposal);
   trained.file.layout = candidates.layout;
   trained.file.settings = {{"method", fmt::format("{}:{}", family, candidates.layout.name())},
                            {"candidates", std::to_string(candidates.size())},
-                           {"uniform", fmt::format("{}", settings.uniform)},
+                           {"uniform_share", fmt::format("{}", settings.uniform_share)},
                            {"seed", std::to_string(seed)},
                            {"train_seconds", fmt::format("{:.3f}", trained.log.seconds)},
                            {"stopped", trained.log.stopped}};
@@ -146,6 +147,20 @@ void log_density(const Trained& trained, const Rows<const double>& y, const Numb
   });
 }
 
+/// The rows of the table of options, spelled as in Python.
+std::vector<std::tuple<std::string, std::string, std::string, std::string, std::string, std::vector<std::string>>>
+training_options() {
+  std::vector<std::tuple<std::string, std::string, std::string, std::string, std::string, std::vector<std::string>>>
+      rows;
+  TrainSettings settings;
+  for (const Option& option : training_option_table(settings)) {
+    std::string name = option.name;
+    std::replace(name.begin(), name.end(), '-', '_');
+    rows.emplace_back(name, option.group, option.help, option.domain(), option.defaults(), users_of(option));
+  }
+  return rows;
+}
+
 /// Name, kind, bounce and size of each group.
 std::vector<std::tuple<std::string, std::string, int, int>> groups(const Layout& layout) {
   std::vector<std::tuple<std::string, std::string, int, int>> all;
@@ -183,36 +198,17 @@ void bind_training(nb::module_& m) {
 
   nb::class_<TrainingOptions>(m, "TrainingOptions", "Options of training, named as those of the command line.")
       .def(nb::init<>())
-      .def_rw("epp", &TrainingOptions::epp)
-      .def_rw("examples", &TrainingOptions::examples)
-      .def_prop_rw(
-          "alpha", [](const TrainingOptions& o) { return o.settings.alpha; },
-          [](TrainingOptions& o, double alpha) { o.settings.alpha = alpha; })
-      .def_prop_rw(
-          "uniform", [](const TrainingOptions& o) { return o.settings.uniform; },
-          [](TrainingOptions& o, double share) { o.settings.uniform = share; })
-      .def_prop_rw(
-          "leaves", [](const TrainingOptions& o) { return o.settings.kdtree.max_leaves; },
-          [](TrainingOptions& o, int leaves) { o.settings.kdtree.max_leaves = leaves; })
-      .def_rw("init", &TrainingOptions::init)
-      .def_rw("training_samples", &TrainingOptions::training_samples)
-      .def_rw("bn", &TrainingOptions::bn)
-      .def_rw("masks", &TrainingOptions::masks)
-      .def_rw("architecture", &TrainingOptions::architecture)
-      .def_rw("loss", &TrainingOptions::loss)
-      .def_rw("networks", &TrainingOptions::networks)
-      .def_rw("kdtree_target", &TrainingOptions::kdtree_target)
-      .def_rw("kdtree_split", &TrainingOptions::kdtree_split)
-      .def_rw("couplings", &TrainingOptions::couplings, nb::arg().none())
-      .def_rw("width", &TrainingOptions::width, nb::arg().none())
-      .def_rw("blocks", &TrainingOptions::blocks, nb::arg().none())
-      .def_rw("encoding_bins", &TrainingOptions::encoding_bins, nb::arg().none())
-      .def_rw("batch", &TrainingOptions::batch, nb::arg().none())
-      .def_rw("max_steps", &TrainingOptions::max_steps, nb::arg().none())
-      .def_rw("bins", &TrainingOptions::bins, nb::arg().none())
-      .def_rw("rate", &TrainingOptions::rate, nb::arg().none())
-      .def_rw("jitter", &TrainingOptions::jitter, nb::arg().none())
-      .def("candidate_count", [](const TrainingOptions& o) { return candidate_count(o.train_settings(0)); });
+      .def("set", &TrainingOptions::set, "name"_a, "value"_a, "value: as text")
+      .def(
+          "check_used", [](const TrainingOptions& o, const std::string& family) { o.check_used({family}); }, "family"_a)
+      .def("candidate_count", [](const TrainingOptions& o) { return candidate_count(o.settings(0)); });
+  m.def("training_options", training_options, "(name, group, help, values, default, families) of each option");
+  m.def(
+      "families",
+      [](bool joint) {
+        return family_names([joint](const Family& f) { return joint ? f.joint() != nullptr : !f.is_container(); });
+      },
+      "joint"_a, "Names of the families; joint: of those that draw chosen numbers of the whole path");
 
   nb::class_<Trained>(m, "Warp", "A trained proposal, see warpath.Warp.")
       .def_prop_ro("layout", [](const Trained& self) { return self.file.layout; })

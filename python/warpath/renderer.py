@@ -92,19 +92,29 @@ def load_scene(file: str | os.PathLike[str], *, size: tuple[int, int] | None = N
         OSError: a file that cannot be used, with line and column.
     """
     module = _module()
+    options = {"size": _joined("x", size), "crop": _joined(",", crop), "max_depth": max_depth}
     defines = [(name, str(value)) for name, value in parameters.items()]
-    return Scene(module.load(os.fspath(file), defines, size or (0, 0), max_depth or 0, list(crop) if crop else None))
+    return Scene(module.load(os.fspath(file), defines, _texts(options)))
 
 
-def render(scene: Scene, *, spp: int = 0, warp: str | os.PathLike[str] = "none", time: float | None = None, objective: str = "relmse",
+def _joined(separator: str, numbers: Any) -> str | None:
+    return None if numbers is None else separator.join(map(str, numbers))
+
+
+def _texts(options: dict[str, Any]) -> dict[str, str]:
+    """Those that were given, as text."""
+    return {name: str(value) for name, value in options.items() if value is not None}
+
+
+def render(scene: Scene, *, spp: int | None = None, warp: str | os.PathLike[str] = "none", time: float | None = None, objective: str = "relmse",
            sampler: str = "independent", seed: int = 0, **options: Any) -> Image:
     """Renders a scene, as `warpath render` does: the same numbers for the same seed.
 
     Args:
         scene: from `load_scene`.
-        spp: samples per pixel; 0 takes the scene's.
-        warp: "none", FAMILY:DIMS (families: uniform, grid, kdtree, realnvp, spline), "field", "auto", or the
-            file of a trained warp.
+        spp: samples per pixel; None takes the scene's.
+        warp: "none", FAMILY:DIMS (families: uniform, grid, kdtree, realnvp, spline, conditional-kdtree,
+            conditional-spline), "field", "auto", or the file of a trained warp.
         time: seconds for everything, in place of spp.
         objective: the error that samples are placed to lessen where the film is stratified: "mse", "relmse" or "even".
         sampler: "independent", "stratified" or "sobol".
@@ -127,4 +137,5 @@ def render(scene: Scene, *, spp: int = 0, warp: str | os.PathLike[str] = "none",
     """
     if isinstance(warp, Warp):
         raise ValueError("a Warp that is in memory belongs to the renderer that trained it; save it and pass the file")
-    return Image._of(_module().render(scene._core, os.fspath(warp), spp, time, objective, sampler, seed, training_options(options)))
+    settings = {"spp": spp, "time": time, "objective": objective, "sampler": sampler, "seed": seed}
+    return Image._of(_module().render(scene._core, os.fspath(warp), _texts(settings), training_options(options)))

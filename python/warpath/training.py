@@ -130,12 +130,9 @@ class Warp:
 
 def training_options(options: dict[str, Any]) -> _core.TrainingOptions:
     """`options` by their names on the command line, with _ in place of -; ValueError for one that there is not."""
-    known = [name for name in dir(_core.TrainingOptions) if not name.startswith("_") and name != "candidate_count"]
     core = _core.TrainingOptions()
     for name, value in options.items():
-        if name not in known:
-            raise ValueError(f"unknown option {name!r}; known: {', '.join(known)}")
-        setattr(core, name, value)
+        core.set(name, os.fspath(value) if isinstance(value, os.PathLike) else str(value))
     return core
 
 
@@ -147,7 +144,7 @@ def train(candidates: Candidates, family: str = "kdtree", *, init: Warp | None =
         family: "kdtree", "realnvp", "spline", "grid" or "uniform".
         init: a warp to start from.
         seed: of resampling and of the flows' first weights.
-        options: those of the command line, with _ in place of -: `epp`, `alpha`, `uniform`, `max_steps`, `leaves`, ...
+        options: those of the command line, with _ in place of -: `epp`, `alpha`, `uniform_share`, `max_steps`, `leaves`, ...
 
     Example: two numbers, a peak.
 

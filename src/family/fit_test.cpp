@@ -77,6 +77,17 @@ TEST_P(FitFamilyTest, TrainedWarpsCanBeStored) {
 INSTANTIATE_TEST_SUITE_P(Families, FitFamilyTest, testing::Values("uniform", "grid", "kdtree", "realnvp", "spline"),
                          [](const auto& info) { return std::string(info.param); });
 
+TEST(LoadProposal, SuggestsTheFamilyThatMayBeMeant) {
+  TensorFile file;
+  Uniform(2).save(file, "a.");
+  EXPECT_EQ(load_proposal(file, "a.")->family(), "uniform");
+  file.metadata()["a.family"] = "unifrom";
+  EXPECT_THAT([&] { load_proposal(file, "a."); },
+              testing::ThrowsMessage<FileError>(testing::HasSubstr("did you mean \"uniform\"?")));
+  file.metadata()["a.family"] = "field";
+  EXPECT_THROW(load_proposal(file, "a."), FileError) << "a warp of vertices is no proposal";
+}
+
 TEST(FitFamily, HandsOutTheBareWarpOnRequest) {
   TrainSettings settings = quick();
   settings.uniform_share = 0;

@@ -147,11 +147,14 @@ void add_trees(std::vector<Option>& rows, TrainSettings& s) {
   constexpr char kGroup[] = "Grid, kd-tree, splines and field";
   using Target = KdTreeSettings::Target;
   using Split = KdTreeSettings::Split;
+  rows.push_back({"intervals",
+                  kGroup,
+                  "Intervals of the grid in each dimension",
+                  {{"grid", whole(s.grid.intervals, 1, 100'000)}}});
   rows.push_back({"bins",
                   kGroup,
-                  "Intervals of the grid in each dimension; bins of each spline",
-                  {{"grid", whole(s.grid.bins, 1, 1 << 20)},
-                   {"spline", whole(s.spline.bins, 2, 64)},
+                  "Bins of each spline",
+                  {{"spline", whole(s.spline.bins, 2, 64)},
                    {"conditional-spline", whole(s.conditional_spline.flow.bins, 2, 64)}}});
   rows.push_back({"kdtree-target",
                   kGroup,

@@ -60,7 +60,7 @@ Learner::Learner(int dims, const std::string& family, std::uint64_t seed, std::s
   const JointFamily& joint = family_of_name(family);
   if (dims < 1 || dims > joint.most_dims)
     throw ConfigError(fmt::format("{} dimensions; the warp \"{}\" has 1 to {}", dims, family, joint.most_dims));
-  if (has_front() || family == kGrid) m_grid = std::make_shared<const Grid>(dims, GridSettings().bins);
+  if (has_front() || family == kGrid) m_grid = std::make_shared<const Grid>(dims, GridSettings().intervals);
   m_adapts = has_front() ? find_family(kFront)->joint() : &joint;
 }
 

@@ -98,14 +98,14 @@ std::vector<double> refined(std::span<const double> edges, std::span<const doubl
 std::shared_ptr<const Grid> fit_grid(const Examples& examples, const GridSettings& settings, const Grid* init) {
   const std::size_t dims = examples.y.cols();
   WARPATH_CHECK_EQ(examples.weight.size(), examples.size());
-  if (settings.bins < 1 || settings.bins > 100'000)
-    throw ConfigError(fmt::format("grid: {} bins, not 1 to 100000", settings.bins));
+  if (settings.intervals < 1 || settings.intervals > 100'000)
+    throw ConfigError(fmt::format("grid: {} intervals, not 1 to 100000", settings.intervals));
   if (settings.iterations < 1) throw ConfigError("grid: needs at least 1 iteration");
   if (!(settings.alpha >= 0)) throw ConfigError("grid: alpha must not be negative");
   if (init && init->dims() != static_cast<int>(dims))
     throw ConfigError(fmt::format("grid: the map to start from has {} dimensions, not {}", init->dims(), dims));
-  auto grid =
-      init ? std::make_shared<const Grid>(*init) : std::make_shared<const Grid>(static_cast<int>(dims), settings.bins);
+  auto grid = init ? std::make_shared<const Grid>(*init)
+                   : std::make_shared<const Grid>(static_cast<int>(dims), settings.intervals);
   std::shared_ptr<const Grid> best = grid;
   double least = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration <= settings.iterations; ++iteration) {

@@ -117,7 +117,7 @@ struct FieldSettings {
 };
 
 struct GridSettings {
-  int bins = 128;  ///< intervals in each dimension
+  int intervals = 128;  ///< in each dimension
   int iterations = 10;
   double alpha = 0.5;  ///< VEGAS's damping
   /// Share of z that an interval is given ~ mean of g, or sqrt(E[g^2 / q]), which is VEGAS's and best if known well.

@@ -10,6 +10,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from .. import _core
 from ..training import Candidates, Layout, Warp, training_options
 from ..training import train as fit
 from .black_box import BlackBox
@@ -20,7 +21,6 @@ from .film import Film
 _WAVEFRONT = 2**21
 # Camera rays for directly seen emission, for each sample: its edges would else be most of the noise.
 _EMISSION_RAYS = 4
-_FAMILIES = ("none", "uniform", "grid", "kdtree", "realnvp", "spline")
 
 
 def render(scene: mi.Scene, spp: int = 0, warp: str | os.PathLike[str] | Warp = "kdtree:film+bounce1", *, sensor: int | mi.Sensor = 0,
@@ -86,7 +86,9 @@ def train(scene: mi.Scene, warp: str = "kdtree:film+bounce1", *, sensor: int | m
     family, layout = _parse(warp)
     if layout is None or family == "uniform":
         raise ValueError(f'"{warp}": there is nothing to train')
-    count = training_options(options).candidate_count()
+    training = training_options(options)
+    training.check_used(family)
+    count = training.candidate_count()
     candidates = Candidates(layout.name, count, seed)
     box = BlackBox(scene, sensor, integrator, layout)
     for first in range(0, count, _WAVEFRONT):
@@ -112,8 +114,9 @@ def _parts(scene, sensor, integrator):
 
 def _parse(warp: str) -> tuple[str, Layout | None]:
     family, _, dims = warp.partition(":")
-    if family not in _FAMILIES:
-        raise ValueError(f'unknown warp "{warp}", neither a file nor one of {", ".join(_FAMILIES)}')
+    known = ["none", *_core.families(joint=True)]
+    if family not in known:
+        raise ValueError(f'unknown warp "{warp}", neither a file nor one of {", ".join(known)}')
     if family == "none":
         if dims:
             raise ValueError(f'"{warp}": none has no dimensions; uniform:{dims} draws those at random')
@@ -126,10 +129,11 @@ def _prepare(scene, sensor, integrator, warp, seed, options) -> tuple[Warp | Non
     if not isinstance(warp, Warp) and os.path.exists(warp):
         warp = Warp.load(warp)
     if isinstance(warp, Warp):
+        training_options(options).check_used("none")
         return warp, warp.layout
     family, layout = _parse(os.fspath(warp))
     if layout is None:
-        training_options(options)
+        training_options(options).check_used(family)
         return None, None
     if family == "uniform":
         return fit(Candidates(layout.name, 1), "uniform", **options), layout
