@@ -18,7 +18,7 @@ def front_page():
     results = compare("front-page", scene, ["none", "field"], **film, time=30, objective="relmse", **against)
     write_strip(folder, ["none", "field"], PART)
     write_record("front-page", {"country-kitchen": rows_of(results)}, {**film, "time": 30, "objective": "relmse"})
-    render("front-page/study", own_scene("study"), folder / "study.jpg", warp="field", size="800x450", spp=2048)
+    render("front-page/study", own_scene("study"), folder / "study.jpg", warp="field", size="640x360", spp=1024)
 
 
 ALL = (front_page,)
