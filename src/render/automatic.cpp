@@ -7,19 +7,22 @@
 namespace warpath {
 namespace {
 
-// The constants of the rule, in its order. Passes are named by the samples per pixel before them.
-/// 1. So many samples per pixel are uniform: with 4, one scene in eight was judged by fireflies.
+// The constants of the rule, in its order, each with what was measured (160 x 90, three to five seeds, where no more is
+// said). Passes are named by the samples per pixel before them.
+
+/// 1. So many samples per pixel are uniform, half of which tell the error of a uniform sample. At 32 samples per pixel
+/// they cost `auto` 10 to 50 % of what the field gains on twelve public scenes.
 constexpr int kTrialSpp = 8;
 /// 1. Where costs are measured, this pass teaches nothing: it shows what a path costs without a warp.
 constexpr int kPlainCostSpp = 2;
 /// 2. Cost of a path with the field where costs are counted: 1.87 times a plain one on the kitchen, 1.82 on the White
-/// Room, looking up, drawing, learning and longer paths included.
+/// Room, with looking up, drawing, learning and longer paths.
 constexpr double kCountedCost = 1.85;
-/// 2. Hopeless is less than this: a field that has seen 8 samples per pixel gains up to 5 times more later, and where
-/// light is rare, errors of few uniform samples come out too small besides.
+/// 2. Less than this is hopeless. At the first look the field has 0.62 to 0.83 on `ajar`, where it gains tenfold in the
+/// end, 0.71 to 0.75 on the White Room, where it gains twofold, and 0.17 to 0.42 on `coins`, where caustics defeat it.
 constexpr double kHopeless = 0.2;
-/// 3. The pass of the second look, and what pays then: the uniform pass that it is compared with was shorter, and looks
-/// better than it was.
+/// 3. The pass of the second look, and what pays then. The uniform pass that it is compared with was shorter, and looks
+/// better than it was: a bound of 1 gave the field up where it gained eightfold.
 constexpr int kSecondLookSpp = 32;
 constexpr double kPays = 0.5;
 /// 4. Passes from here on are watched. Learning costs this share of a path; as each pass is as long as all before it,
