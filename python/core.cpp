@@ -20,11 +20,7 @@ Iteration end(Integrator& integrator, bool adapt) {
   return integrator.end(adapt);
 }
 
-}  // namespace
-
-NB_MODULE(_core, m) {
-  m.doc() = "Compiled parts of warpath.";
-  register_errors();
+void bind_results(nb::module_& m) {
   nb::class_<Iteration>(m, "Iteration", "What one iteration says of each integral.")
       .def_ro("mean", &Iteration::mean)
       .def_ro("covariance", &Iteration::covariance, "C x C, row by row, of the means")
@@ -54,7 +50,9 @@ NB_MODULE(_core, m) {
       .def("summary", &Integral::summary);
 
   m.def("with_error", &with_error, "mean"_a, "sdev"_a, "`1.0057(64)`: a value with its standard error.");
+}
 
+void bind_integrator(nb::module_& m) {
   nb::class_<Integrator>(m, "Integrator", "Asked for points and told values, see warpath.Integrator.")
       .def(
           "__init__",
@@ -113,6 +111,14 @@ NB_MODULE(_core, m) {
             return Integrator::load(path, {std::move(warp), seed, std::move(sampler), memory});
           },
           "path"_a, "warp"_a, "seed"_a, "sampler"_a, "memory"_a);
+}
 
+}  // namespace
+
+NB_MODULE(_core, m) {
+  m.doc() = "Compiled parts of warpath.";
+  register_errors();
+  bind_results(m);
+  bind_integrator(m);
   bind_training(m);
 }

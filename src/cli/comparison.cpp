@@ -7,6 +7,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "cli/density_pictures.h"
 #include "cli/method_run.h"
 #include "cli/output.h"
 #include "cli/terminal.h"
@@ -14,7 +15,6 @@
 #include "core/rng.h"
 #include "core/streams.h"
 #include "report/densities.h"
-#include "train/marginals.h"
 #include "warpath/error.h"
 
 namespace warpath {
@@ -35,21 +35,6 @@ std::string file_name(std::string method) {
   for (char& c : method)
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '+' && c != '.' && c != '-') c = '_';
   return method;
-}
-
-/// Name of each column of y: `film.x`, `bounce1.dir.u`, `bounce1.lobe`.
-std::vector<std::string> column_names(const Layout& layout) {
-  std::vector<std::string> names;
-  for (const Group group : layout.groups()) {
-    const bool film = group.kind == GroupKind::film;
-    if (group.size() == 1) {
-      names.push_back(group.name());
-    } else {
-      names.push_back(group.name() + (film ? ".x" : ".u"));
-      names.push_back(group.name() + (film ? ".y" : ".v"));
-    }
-  }
-  return names;
 }
 
 Reference as_reference(const ImageEstimate& estimate) {
@@ -107,9 +92,9 @@ void ComparisonRunner::run(int threads) {
     for (int run = 0; run < m_command.runs; ++run) settings_of(method, c.seed + static_cast<std::uint64_t>(run));
 
   prepare_reference();
-  m_data.reference = m_reference.image;
-  c.reference = m_reference.path.string();
-  c.reference_has_variance = m_reference.variance.has_value();
+  m_data.reference = m_references.image.image;
+  c.reference = m_references.image.path.string();
+  c.reference_has_variance = m_references.image.variance.has_value();
 
   if (m_command.resume) take_finished_runs();
   for (int run = 0; run < m_command.runs && !g_interrupted; ++run)
@@ -143,21 +128,21 @@ void ComparisonRunner::prepare_reference() {
     estimator.add_pass(spp, progress.callback());
     if (g_interrupted) throw Interrupted{};
     const ImageEstimate image = estimator.develop();
-    m_reference = as_reference(image);
-    m_reference.path = m_command.directory / "reference.exr";
-    m_reference_rest = as_reference(estimator.develop_rest());
-    write_image(m_reference.path, image_file(image));
+    m_references.image = as_reference(image);
+    m_references.image.path = m_command.directory / "reference.exr";
+    m_references.rest = as_reference(estimator.develop_rest());
+    write_image(m_references.image.path, image_file(image));
     return;
   }
-  m_reference = read_reference(m_command.reference, film().crop_width, film().crop_height);
+  m_references.image = read_reference(m_command.reference, film().crop_width, film().crop_height);
   // What is left of the given reference without what the camera sees emitted directly.
   constexpr int kEmissionSpp = 256;
   estimator.add_emission_pass(kEmissionSpp);
   const ImageEstimate emission = estimator.develop_emission();
-  m_reference_rest = m_reference;
+  m_references.rest = m_references.image;
   for (std::size_t p = 0; p < emission.mean.size(); ++p) {
-    m_reference_rest.image.pixels[p] -= emission.mean[p];
-    if (m_reference_rest.variance) m_reference_rest.variance->pixels[p] += emission.variance[p];
+    m_references.rest.image.pixels[p] -= emission.mean[p];
+    if (m_references.rest.variance) m_references.rest.variance->pixels[p] += emission.variance[p];
   }
 }
 
@@ -210,40 +195,23 @@ MethodRun ComparisonRunner::run_method(const Method& method, int run) {
   const Rendered rendered =
       m_renderer.render(method, settings, m_command.training.settings(seed),
                         fmt::format("{}, run {} of {}", method.name, run + 1, m_command.runs),
-                        [&](const Rendered& so_far) { curve.push_back(error_point(so_far, m_reference)); });
-
-  MethodRun result = method_run(method, settings, rendered);
-  result.size = size_name(film());
-  result.error_curve = std::move(curve);
-  const ImageEstimate image = rendered.estimator->develop();
-  set_errors(result, image, image_rgb(rendered.estimator->develop_rest()), m_reference, m_reference_rest);
-  if (run == 0) {
-    m_data.images.push_back({method.name, image_rgb(image)});
-    ImageFile file = image_file(image);
-    describe(file, m_renderer.tracer(), method, m_command.render.seed, *rendered.estimator, result.total_seconds);
-    write_image(m_command.directory / (file_name(method.name) + ".exr"), file);
-    keep_densities(method, rendered.preparation);
-  }
-  return result;
+                        [&](const Rendered& so_far) { curve.push_back(error_point(so_far, m_references.image)); });
+  MethodRun measured = measure(method, settings, rendered, m_references);
+  measured.size = size_name(film());
+  measured.error_curve = std::move(curve);
+  if (run == 0) keep_first_run(method, rendered);
+  return measured;
 }
 
-void ComparisonRunner::keep_densities(const Method& method, const Preparation& prepared) {
-  if (!prepared.candidates || !prepared.proposal) return;
-  constexpr int kBins = 64;
-  constexpr std::uint64_t kSamples = 1 << 20;
-  // Columns in pairs: both numbers of a group where it has two, else it and the first one of the next group, or, where
-  // there is none, the x of the film and it.
-  const std::vector<std::string> names = column_names(method.layout);
-  const auto grid = [](Marginal marginal) { return DensityGrid{kBins, kBins, std::move(marginal.density)}; };
-  for (const Group group : method.layout.groups()) {
-    int x = method.layout.column(group), y = x + 1;
-    if (y >= method.layout.dims()) std::tie(x, y) = std::pair(0, x);
-    if (x == y) continue;
-    m_data.densities.push_back({method.name, names[static_cast<std::size_t>(x)], names[static_cast<std::size_t>(y)], "",
-                                grid(proposal_marginal(*prepared.proposal, x, y, kBins, kSamples)),
-                                grid(target_marginal(*prepared.candidates, x, y, kBins))});
-  }
-  write_densities(m_command.directory / "densities.json", m_data.densities);
+void ComparisonRunner::keep_first_run(const Method& method, const Rendered& rendered) {
+  const ImageEstimate image = rendered.estimator->develop();
+  m_data.images.push_back({method.name, image_rgb(image)});
+  ImageFile file = image_file(image);
+  describe(file, m_renderer.tracer(), method, m_command.render.seed, *rendered.estimator, rendered.seconds());
+  write_image(m_command.directory / (file_name(method.name) + ".exr"), file);
+  for (DensityPicture& picture : density_pictures(method, rendered.preparation))
+    m_data.densities.push_back(std::move(picture));
+  if (!m_data.densities.empty()) write_densities(m_command.directory / "densities.json", m_data.densities);
 }
 
 }  // namespace warpath

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/method_run.h"
 #include "cli/replay.h"
 #include "render/renderer.h"
 #include "report/html.h"
@@ -31,13 +32,14 @@ class ComparisonRunner {
   /// Of the run-th run of a method. Throws ConfigError where there is nothing to replay.
   RenderSettings settings_of(const Method& method, std::uint64_t seed) const;
   MethodRun run_method(const Method& method, int run);
-  void keep_densities(const Method& method, const Preparation& preparation);
+  /// Its image and densities, for the report.
+  void keep_first_run(const Method& method, const Rendered& rendered);
 
   CompareCommand m_command;
   Renderer m_renderer;
   std::vector<Method> m_methods;
   std::optional<Replay> m_replay;  // read before results.json is written, which may be the same file
-  Reference m_reference, m_reference_rest;
+  References m_references;
   ReportData m_data;
 };
 

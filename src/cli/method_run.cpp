@@ -20,9 +20,8 @@ std::pair<double, double> predicted_errors(const ImageEstimate& image, const Ima
   return {mse / count, relmse / count};
 }
 
-}  // namespace
-
-MethodRun method_run(const Method& method, const RenderSettings& settings, const Rendered& rendered) {
+/// All but the errors.
+MethodRun summarise(const Method& method, const RenderSettings& settings, const Rendered& rendered) {
   const Preparation& prepared = rendered.preparation;
   const RenderCost& cost = rendered.estimator->cost();
   MethodRun run;
@@ -59,20 +58,26 @@ MethodRun method_run(const Method& method, const RenderSettings& settings, const
   return run;
 }
 
+}  // namespace
+
+MethodRun measure(const Method& method, const RenderSettings& settings, const Rendered& rendered,
+                  const References& references) {
+  MethodRun run = summarise(method, settings, rendered);
+  const ImageEstimate estimate = rendered.estimator->develop();
+  const ImageRgb image = image_rgb(estimate), rest = image_rgb(rendered.estimator->develop_rest());
+  run.set_errors(image_errors(image, references.image));
+  std::tie(run.mse_predicted, run.relmse_predicted) = predicted_errors(estimate, references.image.image);
+  const ImageErrors rest_errors = image_errors(rest, references.rest);
+  run.mse_rest = rest_errors.mse;
+  run.relmse_rest = rest_errors.relmse;
+  run.mean = image_mean(image);
+  run.mean_rest = image_mean(rest);
+  return run;
+}
+
 ErrorPoint error_point(const Rendered& rendered, const Reference& reference) {
   const ImageErrors errors = image_errors(image_rgb(rendered.estimator->develop()), reference);
   return {rendered.estimator->spp(), rendered.seconds(), errors.mse, errors.relmse, rendered.cpu_seconds()};
-}
-
-void set_errors(MethodRun& run, const ImageEstimate& image, const ImageRgb& rest, const Reference& reference,
-                const Reference& reference_rest) {
-  run.set_errors(image_errors(image_rgb(image), reference));
-  std::tie(run.mse_predicted, run.relmse_predicted) = predicted_errors(image, reference.image);
-  const ImageErrors rest_errors = image_errors(rest, reference_rest);
-  run.mse_rest = rest_errors.mse;
-  run.relmse_rest = rest_errors.relmse;
-  run.mean = image_mean(image_rgb(image));
-  run.mean_rest = image_mean(rest);
 }
 
 }  // namespace warpath

@@ -4,14 +4,17 @@
 
 namespace warpath {
 
-/// What results.json keeps of a render, but for its errors.
-MethodRun method_run(const Method& method, const RenderSettings& settings, const Rendered& rendered);
+/// What images are measured against.
+struct References {
+  Reference image;
+  Reference rest;  ///< without directly seen emission
+};
+
+/// What results.json keeps of a render: what it did, what it cost, and its errors.
+MethodRun measure(const Method& method, const RenderSettings& settings, const Rendered& rendered,
+                  const References& references);
 
 /// The error of the image so far, as a point of its curve.
 ErrorPoint error_point(const Rendered& rendered, const Reference& reference);
-
-/// Errors against the references of the whole image, and of what is left without directly seen emission.
-void set_errors(MethodRun& run, const ImageEstimate& image, const ImageRgb& rest, const Reference& reference,
-                const Reference& reference_rest);
 
 }  // namespace warpath
