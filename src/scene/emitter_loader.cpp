@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 
 #include "scene/loader.h"
@@ -83,11 +82,9 @@ struct Plugin {
   std::string_view name;
   Model (*load)(LoadContext&, const Object&);
 };
-constexpr Plugin kPlugins[] = {{"envmap", load_envmap},
-                               {"constant", load_constant},
-                               {"point", load_point},
-                               {"spot", load_spot},
-                               {"directional", load_directional}};
+constexpr Plugin kPlugins[] = {{"area", nullptr},  // by its shape: load_area_emitter
+                               {"envmap", load_envmap}, {"constant", load_constant},      {"point", load_point},
+                               {"spot", load_spot},     {"directional", load_directional}};
 
 float get_sampling_weight(const Object& object) {
   const float weight = object.get_float("sampling_weight", 1);
@@ -95,28 +92,18 @@ float get_sampling_weight(const Object& object) {
   return weight;
 }
 
-[[noreturn]] void fail_unknown(const Object& object) {
-  std::vector<std::string_view> names{"area"};
-  for (const Plugin& p : kPlugins) names.push_back(p.name);
-  fail(object.where, "unknown emitter \"{}\";{}", object.type, suggestion(object.type, names));
-}
-
 }  // namespace
 
 void load_emitter(LoadContext& context, const Object& object) {
-  const auto* plugin =
-      std::find_if(std::begin(kPlugins), std::end(kPlugins), [&](const Plugin& p) { return p.name == object.type; });
-  if (plugin == std::end(kPlugins)) fail_unknown(object);
-  Emitter emitter{object.id, get_sampling_weight(object), plugin->load(context, object)};
+  const Plugin& plugin = find_plugin(kPlugins, object);
+  Emitter emitter{object.id, get_sampling_weight(object), plugin.load(context, object)};
   object.check_all_read();
   context.scene.emitters.push_back(std::move(emitter));
 }
 
 std::int32_t load_area_emitter(LoadContext& context, const Object& object, std::int32_t shape) {
   if (object.type != "area") {
-    const bool known =
-        std::any_of(std::begin(kPlugins), std::end(kPlugins), [&](const Plugin& p) { return p.name == object.type; });
-    if (!known) fail_unknown(object);
+    find_plugin(kPlugins, object);
     fail(object.where, "a \"{}\" emitter cannot stand in a shape; put it into the scene, or use \"area\"", object.type);
   }
   if (object.has("to_world"))

@@ -64,6 +64,17 @@ TextureId get_texture(LoadContext& context, const Object& object, std::string_vi
 Color get_color(LoadContext& context, const Object& object, std::string_view name, float missing, ColorRole role);
 TextureId load_texture(LoadContext& context, const Object& object, ColorRole role);
 
+/// The row of a table of plugins for the type of an object; SceneError with the nearest name if there is none.
+template <class Plugins>
+const auto& find_plugin(const Plugins& plugins, const Object& object) {
+  std::vector<std::string_view> names;
+  for (const auto& plugin : plugins) {
+    if (plugin.name == object.type) return plugin;
+    names.push_back(plugin.name);
+  }
+  fail(object.where, "unknown {} \"{}\";{}", object.tag, object.type, suggestion(object.type, names));
+}
+
 BsdfId load_bsdf(LoadContext& context, const Object& object);
 /// An emitter that stands by itself in the scene.
 void load_emitter(LoadContext& context, const Object& object);

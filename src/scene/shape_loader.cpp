@@ -139,16 +139,9 @@ BsdfId default_bsdf(LoadContext& context, bool shines) {
 }  // namespace
 
 void load_shape(LoadContext& context, const Object& object) {
-  const auto* plugin =
-      std::find_if(std::begin(kPlugins), std::end(kPlugins), [&](const Plugin& p) { return p.name == object.type; });
-  if (plugin == std::end(kPlugins)) {
-    std::vector<std::string_view> names;
-    for (const Plugin& p : kPlugins) names.push_back(p.name);
-    fail(object.where, "unknown shape \"{}\";{}", object.type, suggestion(object.type, names));
-  }
   Shape shape;
   shape.id = object.id;
-  shape.geometry = plugin->load(context, object);
+  shape.geometry = find_plugin(kPlugins, object).load(context, object);
   object.ignore({"silhouette_sampling_weight"});  // for Mitsuba's derivatives
 
   const auto only = [&](std::string_view tag) -> const Object* {
