@@ -8,6 +8,7 @@
 namespace warpath {
 
 // BSDFs as scene files describe them, with Mitsuba 3's names, defaults and meanings; the tracer compiles them.
+// Those that let light through, other than by what they nest, say so: transmits().
 using BsdfId = std::int32_t;  ///< index into Scene::bsdfs
 
 enum class MicrofacetType : std::uint8_t { beckmann, ggx };
@@ -29,10 +30,12 @@ struct RoughConductor {
 struct Dielectric {
   float eta = 1.5046f / 1.000277f;  ///< inside over outside
   TextureId specular_reflectance, specular_transmittance;
+  bool transmits() const { return true; }
 };
 struct ThinDielectric {
   float eta = 1.5046f / 1.000277f;
   TextureId specular_reflectance, specular_transmittance;
+  bool transmits() const { return true; }
 };
 struct RoughDielectric {
   MicrofacetType distribution = MicrofacetType::beckmann;
@@ -40,6 +43,7 @@ struct RoughDielectric {
   bool sample_visible = true;
   float eta = 1.5046f / 1.000277f;
   TextureId specular_reflectance, specular_transmittance;
+  bool transmits() const { return true; }
 };
 struct Plastic {
   float eta = 1.49f / 1.000277f;
@@ -56,13 +60,14 @@ struct RoughPlastic {
 };
 /// Mitsuba 3's `principled`; eta or specular sets the index of refraction.
 struct Principled {
-  TextureId base_color, roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat,
-      clearcoat_gloss;
+  TextureId base_color, roughness;
+  /// -1: the scene file leaves the lobe out, or sets it to 0.
+  TextureId anisotropic = -1, metallic = -1, spec_trans = -1, spec_tint = -1, sheen = -1, sheen_tint = -1,
+            flatness = -1, clearcoat = -1;
+  TextureId clearcoat_gloss = -1;
   float eta = 1.5f;  ///< inside over outside, already computed from `specular` where that is given
   float diffuse_reflectance_sampling_rate = 1, main_specular_sampling_rate = 1, clearcoat_sampling_rate = 1;
-  /// Lobes that the scene file leaves out altogether, so that the compiler of materials need not look at textures.
-  bool has_anisotropic = false, has_metallic = false, has_spec_trans = false, has_spec_tint = false, has_sheen = false,
-       has_sheen_tint = false, has_flatness = false, has_clearcoat = false;
+  bool transmits() const { return spec_trans >= 0; }
 };
 struct TwoSided {
   BsdfId front, back;
@@ -70,6 +75,7 @@ struct TwoSided {
 struct Mask {
   BsdfId nested;
   TextureId opacity;
+  bool transmits() const { return true; }
 };
 struct BlendBsdf {
   BsdfId first, second;
@@ -88,7 +94,9 @@ struct NormalMap {
   bool flip_invalid_normals = true;
   bool use_shadowing_function = true;
 };
-struct Null {};
+struct Null {
+  bool transmits() const { return true; }
+};
 
 struct Bsdf {
   std::string id;

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 
 #include "scene/loader.h"
@@ -71,27 +70,15 @@ std::vector<BsdfId> load_nested(LoadContext& context, const Object& object, std:
   return result;
 }
 
-bool transmits(const Scene& scene, BsdfId id);
-
-struct Transmits {
-  const Scene& scene;
-  bool operator()(const Dielectric&) const { return true; }
-  bool operator()(const ThinDielectric&) const { return true; }
-  bool operator()(const RoughDielectric&) const { return true; }
-  bool operator()(const Null&) const { return true; }
-  bool operator()(const Mask&) const { return true; }
-  bool operator()(const Principled& b) const { return b.has_spec_trans; }
-  bool operator()(const BlendBsdf& b) const { return transmits(scene, b.first) || transmits(scene, b.second); }
-  bool operator()(const BumpMap& b) const { return transmits(scene, b.nested); }
-  bool operator()(const NormalMap& b) const { return transmits(scene, b.nested); }
-  template <class Other>
-  bool operator()(const Other&) const {
-    return false;
-  }
-};
-
 bool transmits(const Scene& scene, BsdfId id) {
-  return std::visit(Transmits{scene}, scene.bsdfs[static_cast<std::size_t>(id)].model);
+  return std::visit(
+      [&](const auto& b) {
+        if constexpr (requires { b.transmits(); }) return b.transmits();
+        if constexpr (requires { b.nested; }) return transmits(scene, b.nested);
+        if constexpr (requires { b.first; }) return transmits(scene, b.first) || transmits(scene, b.second);
+        return false;
+      },
+      scene.bsdfs[static_cast<std::size_t>(id)].model);
 }
 
 Model load_diffuse(LoadContext& context, const Object& object) {
@@ -162,23 +149,23 @@ Model load_roughplastic(LoadContext& context, const Object& object) {
 
 Model load_principled(LoadContext& context, const Object& object) {
   Principled b;
-  const auto lobe = [&](std::string_view name, TextureId& texture) {
-    texture = reflectance(context, object, name, 0);
+  const auto lobe = [&](std::string_view name) {
+    const TextureId texture = reflectance(context, object, name, 0);
     const Property* property = object.find(name);
-    if (!property) return false;
+    if (!property) return -1;
     const auto* value = std::get_if<double>(&property->value);
-    return !value || *value != 0;
+    return value && *value == 0 ? -1 : texture;
   };
   b.base_color = reflectance(context, object, "base_color", 0.5f);
   b.roughness = reflectance(context, object, "roughness", 0.5f);
-  b.has_anisotropic = lobe("anisotropic", b.anisotropic);
-  b.has_metallic = lobe("metallic", b.metallic);
-  b.has_spec_trans = lobe("spec_trans", b.spec_trans);
-  b.has_spec_tint = lobe("spec_tint", b.spec_tint);
-  b.has_sheen = lobe("sheen", b.sheen);
-  b.has_sheen_tint = lobe("sheen_tint", b.sheen_tint);
-  b.has_flatness = lobe("flatness", b.flatness);
-  b.has_clearcoat = lobe("clearcoat", b.clearcoat);
+  b.anisotropic = lobe("anisotropic");
+  b.metallic = lobe("metallic");
+  b.spec_trans = lobe("spec_trans");
+  b.spec_tint = lobe("spec_tint");
+  b.sheen = lobe("sheen");
+  b.sheen_tint = lobe("sheen_tint");
+  b.flatness = lobe("flatness");
+  b.clearcoat = lobe("clearcoat");
   b.clearcoat_gloss = reflectance(context, object, "clearcoat_gloss", 0);
   b.main_specular_sampling_rate = object.get_float("main_specular_sampling_rate", 1);
   b.clearcoat_sampling_rate = object.get_float("clearcoat_sampling_rate", 1);
@@ -187,10 +174,10 @@ Model load_principled(LoadContext& context, const Object& object) {
   if (object.has("eta")) {
     if (object.has("specular")) fail(object.find("specular")->where, "give either \"eta\" or \"specular\", not both");
     b.eta = object.get_float("eta", 1.5f);
-    if (b.has_spec_trans && b.eta == 1) b.eta = 1.001f;  // as Mitsuba: nothing would refract
+    if (b.transmits() && b.eta == 1) b.eta = 1.001f;  // as Mitsuba: nothing would refract
   } else {
     float specular = object.get_float("specular", 0.5f);
-    if (b.has_spec_trans && specular == 0) specular = 1e-3f;
+    if (b.transmits() && specular == 0) specular = 1e-3f;
     b.eta = 2 / (1 - std::sqrt(0.08f * specular)) - 1;
   }
   if (!(b.eta > 0)) fail(object.where, "the index of refraction must be greater than 0, not {}", b.eta);
@@ -271,14 +258,7 @@ constexpr Plugin kPlugins[] = {{"diffuse", load_diffuse},
 
 BsdfId load_bsdf(LoadContext& context, const Object& object) {
   if (const auto known = context.bsdfs.find(&object); known != context.bsdfs.end()) return known->second;
-  const auto* plugin =
-      std::find_if(std::begin(kPlugins), std::end(kPlugins), [&](const Plugin& p) { return p.name == object.type; });
-  if (plugin == std::end(kPlugins)) {
-    std::vector<std::string_view> names;
-    for (const Plugin& p : kPlugins) names.push_back(p.name);
-    fail(object.where, "unknown bsdf \"{}\";{}", object.type, suggestion(object.type, names));
-  }
-  Model model = plugin->load(context, object);
+  Model model = find_plugin(kPlugins, object).load(context, object);
   object.check_all_read();
   return context.bsdfs[&object] = context.add_bsdf({object.id, std::move(model)});
 }

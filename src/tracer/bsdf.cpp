@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "tracer/lobe.h"
+#include "tracer/lobe_model.h"
 #include "tracer/material.h"
 #include "tracer/scatter.h"
 
@@ -50,20 +50,17 @@ LobeEval eval(const Scatter& scatter, const ScatterLobe& lobe, const Vec3& wo) {
 
 const ScatterLobe* lobes_end(const Scatter& scatter) { return scatter.lobes.data() + scatter.lobe_count; }
 
-/// The commonest BSDF, which needs no more of its frame than the normal.
-bool is_plain_diffuse(const Scatter& scatter) {
-  const ScatterLobe& l = scatter.lobes[0];
-  return scatter.lobe_count == 1 && l.frame == 0 && scatter.models[l.model].type == LobeType::diffuse;
-}
-
 }  // namespace
 
 Color eval_pdf_bsdf(const Scatter& scatter, const Vec3& wo, float& pdf) {
-  if (is_plain_diffuse(scatter)) {
-    const float side = scatter.lobes[0].mirrored ? -1.0f : 1.0f;
+  const ScatterLobe& first = scatter.lobes[0];
+  const auto* diffuse = std::get_if<Lobe<Diffuse>>(&scatter.models[first.model].lobe);
+  if (diffuse && scatter.lobe_count == 1 && first.frame == 0) {
+    // Common, and needs no more of its frame than the normal.
+    const float side = first.mirrored ? -1.0f : 1.0f;
     const LobeEval e =
-        eval_diffuse(load_values<DiffuseValues>(scatter.values.data()), {0, 0, side * scatter.wi.dot(scatter.frame.n)},
-                     {0, 0, side * wo.dot(scatter.frame.n)});
+        diffuse->eval({{scatter.values[0], scatter.values[1], scatter.values[2]}},
+                      {0, 0, side * scatter.wi.dot(scatter.frame.n)}, {0, 0, side * wo.dot(scatter.frame.n)});
     pdf = e.pdf;
     return e.value;
   }
@@ -136,27 +133,7 @@ float roughness(const Scatter& scatter) {
 
 SurfaceKind kind(const Scatter& scatter) {
   const auto of = [&](const ScatterLobe& l) {
-    switch (const LobeModel& m = scatter.models[l.model]; m.type) {
-      case LobeType::diffuse:
-        return SurfaceKind::diffuse;
-      case LobeType::conductor:
-      case LobeType::dielectric:
-      case LobeType::thin_dielectric:
-        return SurfaceKind::delta;
-      case LobeType::rough_conductor:
-      case LobeType::rough_dielectric:
-        return SurfaceKind::glossy;
-      case LobeType::principled: {
-        const auto v = load_values<PrincipledValues>(&scatter.values[l.first_value]);
-        return (1 - v.metallic) * (1 - v.spec_trans) > 0 ? SurfaceKind::mixed : SurfaceKind::glossy;
-      }
-      case LobeType::plastic:
-      case LobeType::rough_plastic:
-        return SurfaceKind::mixed;
-      case LobeType::null:
-        break;
-    }
-    return SurfaceKind::null;
+    return lobe_kind(scatter.models[l.model], &scatter.values[l.first_value]);
   };
   const SurfaceKind first = of(scatter.lobes[0]);
   const bool same =

@@ -1,12 +1,16 @@
+#include "tracer/bsdf_principled.h"
+
 #include "tracer/fresnel.h"
-#include "tracer/lobe.h"
 #include "tracer/microfacet.h"
+#include "tracer/sample_square_to_hemisphere.h"
 
 namespace warpath {
 
 // Mitsuba 3's `principled`. [Burley 2012, Physically Based Shading at Disney; Burley 2015, Extending the Disney BRDF]
 
 namespace {
+
+using Values = Lobe<Principled>::Values;
 
 float mix(float a, float b, float t) { return a + (b - a) * t; }
 Color mix(const Color& a, const Color& b, float t) { return a + (b - a) * t; }
@@ -57,21 +61,21 @@ struct ClearCoat {
 /// What sampling and evaluation share at a point.
 struct Setup {
   bool front;
-  float brdf, bsdf;  ///< shares of the diffuse base and of the transmitting one
+  float base, transmitting;  ///< shares of the diffuse base and of the one that transmits
   Microfacet distribution;
   /// Probabilities of the lobes, but for the split of the main specular one by its Fresnel term.
   float diffuse = 0, clearcoat = 0, specular = 0;
 
-  Setup(const LobeModel& m, const PrincipledValues& v, const Vec3& wi)
+  Setup(const Principled& m, const Values& v, const Vec3& wi)
       : front(wi.z > 0),
-        brdf((1 - v.metallic) * (1 - v.spec_trans)),
-        bsdf((1 - v.metallic) * v.spec_trans),
+        base((1 - v.metallic) * (1 - v.spec_trans)),
+        transmitting((1 - v.metallic) * v.spec_trans),
         distribution(make_distribution(m, v)) {
     if (front) {
-      diffuse = brdf * m.diffuse_rate;
-      clearcoat = 0.25f * v.clearcoat * m.clearcoat_rate;
-      specular = m.specular_rate;
-    } else if (bsdf > 0) {
+      diffuse = base * m.diffuse_reflectance_sampling_rate;
+      clearcoat = 0.25f * v.clearcoat * m.clearcoat_sampling_rate;
+      specular = m.main_specular_sampling_rate;
+    } else if (transmitting > 0) {
       specular = 1;  // within, only the main specular lobe scatters
     }
     const float total = diffuse + clearcoat + specular;
@@ -81,23 +85,23 @@ struct Setup {
     specular *= scale;
   }
   /// Share of the main specular lobe that is refracted, at a microfacet with this Fresnel reflectance.
-  float refracted(float fresnel) const { return (front ? bsdf : 1) * (1 - fresnel); }
+  float refracted(float fresnel) const { return (front ? transmitting : 1) * (1 - fresnel); }
 
-  static Microfacet make_distribution(const LobeModel& m, const PrincipledValues& v) {
+  static Microfacet make_distribution(const Principled& m, const Values& v) {
     const float alpha = sqr(v.roughness);
-    const float aspect = m.has_anisotropic ? std::sqrt(1 - 0.9f * v.anisotropic) : 1;
+    const float aspect = m.anisotropic >= 0 ? std::sqrt(1 - 0.9f * v.anisotropic) : 1;
     return {MicrofacetType::ggx, larger(0.001f, alpha / aspect), larger(0.001f, alpha * aspect), true};
   }
 };
 
 /// Fresnel term of the main specular reflection: dielectric, tinted dielectric, and metal.
-Color specular_fresnel(const LobeModel& m, const PrincipledValues& v, const Setup& setup, float fresnel, float cos_h) {
-  if (!setup.front) return Color(setup.bsdf * fresnel);
+Color specular_fresnel(const Principled& m, const Values& v, const Setup& setup, float fresnel, float cos_h) {
+  if (!setup.front) return Color(setup.transmitting * fresnel);
   Color f((1 - v.metallic) * (1 - v.spec_tint) * fresnel);
-  if (!m.has_metallic && !m.has_spec_tint) return f;
+  if (m.metallic < 0 && m.spec_tint < 0) return f;
   const float white = schlick_white(cos_h, m.eta);
-  if (m.has_metallic) f += mix(v.base_color, Color(1.0f), white) * v.metallic;
-  if (m.has_spec_tint) {
+  if (m.metallic >= 0) f += mix(v.base_color, Color(1.0f), white) * v.metallic;
+  if (m.spec_tint >= 0) {
     const float eta_it = cos_h >= 0 ? m.eta : 1 / m.eta;
     const float r0 = sqr((eta_it - 1) / (eta_it + 1));
     f += mix(tint(v.base_color) * r0, Color(1.0f), white) * ((1 - v.metallic) * v.spec_tint);
@@ -106,19 +110,18 @@ Color specular_fresnel(const LobeModel& m, const PrincipledValues& v, const Setu
 }
 
 /// The diffuse base with retro-reflection, flatness and sheen, times |cos theta_o|.
-Color eval_base(const LobeModel& m, const PrincipledValues& v, const Setup& setup, const Vec3& wi, const Vec3& wo,
-                float cos_d) {
+Color eval_base(const Principled& m, const Values& v, const Setup& setup, const Vec3& wi, const Vec3& wo, float cos_d) {
   const float f_i = schlick_weight(wi.z), f_o = schlick_weight(wo.z);
   const float rr = 2 * v.roughness * cos_d * cos_d;
   float f = (1 - 0.5f * f_i) * (1 - 0.5f * f_o) + rr * (f_o + f_i + f_o * f_i * (rr - 1));
-  if (m.has_flatness) {
+  if (m.flatness >= 0) {
     const float fss = mix(1, 0.5f * rr, f_o) * mix(1, 0.5f * rr, f_i);
     f = mix(f, 1.25f * (fss * (1 / (wo.z + wi.z) - 0.5f) + 0.5f), v.flatness);
   }
-  Color value = v.base_color * (setup.brdf * f * cosine_hemisphere_pdf(wo.z));
+  Color value = v.base_color * (setup.base * f * cosine_hemisphere_pdf(wo.z));
   // As in Mitsuba, there is sheen only where the diffuse base is.
-  if (m.has_sheen && setup.brdf > 0) {
-    const Color color = m.has_sheen_tint ? mix(Color(1.0f), tint(v.base_color), v.sheen_tint) : Color(1.0f);
+  if (m.sheen >= 0 && setup.base > 0) {
+    const Color color = m.sheen_tint >= 0 ? mix(Color(1.0f), tint(v.base_color), v.sheen_tint) : Color(1.0f);
     value += color * (v.sheen * (1 - v.metallic) * schlick_weight(std::fabs(cos_d)) * wo.z);
   }
   return value;
@@ -126,13 +129,21 @@ Color eval_base(const LobeModel& m, const PrincipledValues& v, const Setup& setu
 
 }  // namespace
 
-LobeEval eval_principled(const LobeModel& m, const PrincipledValues& v, const Vec3& wi, const Vec3& wo) {
+LobeInputs Lobe<Principled>::inputs() const {
+  const Principled& b = bsdf;
+  return {{b.base_color},
+          {b.roughness, b.anisotropic, b.metallic, b.spec_trans, b.spec_tint, b.sheen, b.sheen_tint, b.flatness,
+           b.clearcoat, b.clearcoat >= 0 ? b.clearcoat_gloss : -1},
+          b.anisotropic >= 0};
+}
+
+LobeEval Lobe<Principled>::eval(const Values& v, const Vec3& wi, const Vec3& wo) const {
   LobeEval e;
   if (wi.z == 0 || wo.z == 0) return e;
-  const Setup setup(m, v, wi);
+  const Setup setup(bsdf, v, wi);
   const bool reflect = wi.z * wo.z > 0;
-  if (!setup.front && !(setup.bsdf > 0)) return e;
-  const float eta = setup.front ? m.eta : 1 / m.eta;  // far side over the side of wi
+  if (!setup.front && !(setup.transmitting > 0)) return e;
+  const float eta = setup.front ? bsdf.eta : 1 / bsdf.eta;  // far side over the side of wi
   Vec3 h = wi + wo * (reflect ? 1.0f : eta);
   const float length2 = h.dot(h);
   if (!(length2 > 0)) return e;
@@ -141,45 +152,45 @@ LobeEval eval_principled(const LobeModel& m, const PrincipledValues& v, const Ve
   const bool facing = wi_h * wi.z > 0 && wo_h * wo.z > 0;  // facet and surface agree on the sides
 
   if (facing) {
-    const float fresnel = fresnel_dielectric(wi_h, m.eta).reflectance;
+    const float fresnel = fresnel_dielectric(wi_h, bsdf.eta).reflectance;
     const float g1_wi = setup.distribution.smith_g1(wi, h);
     const float visible = setup.distribution.eval(h) * g1_wi / std::fabs(wi.z);  // pdf of h over |wi.h|
     const float g1_wo = setup.distribution.smith_g1(wo, h);
     const float refracted = setup.refracted(fresnel);
     if (reflect) {
       // As in Mitsuba, an index of 1 reflects nothing, metal or not.
-      if (fresnel > 0) e.value = specular_fresnel(m, v, setup, fresnel, wi_h) * (visible * g1_wo * 0.25f);
+      if (fresnel > 0) e.value = specular_fresnel(bsdf, v, setup, fresnel, wi_h) * (visible * g1_wo * 0.25f);
       e.pdf = setup.specular * (1 - refracted) * visible * 0.25f;
-      if (m.has_clearcoat && setup.front && v.clearcoat > 0) {
+      if (bsdf.clearcoat >= 0 && setup.front && v.clearcoat > 0) {
         const ClearCoat coat(v.clearcoat_gloss);
-        const float f = mix(0.04f, 1, schlick_white(wi_h, m.eta));
+        const float f = mix(0.04f, 1, schlick_white(wi_h, bsdf.eta));
         const float g = ClearCoat::smith_g1(wi, h) * ClearCoat::smith_g1(wo, h);
         e.value += Color(v.clearcoat * 0.25f * f * coat.eval(h) * g * wo.z);
         e.pdf += setup.clearcoat * coat.pdf(h) / (4 * wo_h);
       }
-    } else if (setup.bsdf > 0) {
+    } else if (setup.transmitting > 0) {
       const float denominator = sqr(wi_h + eta * wo_h);
       if (denominator > 0) {
         const Color root(std::sqrt(larger(0.0f, v.base_color.x)), std::sqrt(larger(0.0f, v.base_color.y)),
                          std::sqrt(larger(0.0f, v.base_color.z)));
         const float jacobian = std::fabs(wo_h * wi_h) / denominator;
-        e.value = root * (setup.bsdf * (1 - fresnel) * visible * g1_wo * jacobian);
+        e.value = root * (setup.transmitting * (1 - fresnel) * visible * g1_wo * jacobian);
         e.pdf = setup.specular * refracted * visible * jacobian * eta * eta;
       }
     }
   }
   if (reflect && setup.front) {
-    if (setup.brdf > 0) e.value += eval_base(m, v, setup, wi, wo, wo_h);
+    if (setup.base > 0) e.value += eval_base(bsdf, v, setup, wi, wo, wo_h);
     e.pdf += setup.diffuse * cosine_hemisphere_pdf(wo.z);
   }
   return e;
 }
 
-LobeSample sample_principled(const LobeModel& m, const PrincipledValues& v, const Vec3& wi, float u, const Vec2& dir) {
+LobeSample Lobe<Principled>::sample(const Values& v, const Vec3& wi, float u, const Vec2& dir) const {
   LobeSample s;
   if (wi.z == 0) return s;
-  const Setup setup(m, v, wi);
-  if (!setup.front && !(setup.bsdf > 0)) return s;
+  const Setup setup(bsdf, v, wi);
+  if (!setup.front && !(setup.transmitting > 0)) return s;
   if (u < setup.diffuse) {
     s.wo = square_to_cosine_hemisphere(dir);
   } else if (u < setup.diffuse + setup.clearcoat) {
@@ -187,7 +198,7 @@ LobeSample sample_principled(const LobeModel& m, const PrincipledValues& v, cons
     if (!(s.wo.z > 0)) return s;
   } else {
     const Vec3 h = setup.distribution.sample(setup.front ? wi : -wi, dir);
-    const FresnelDielectric f = fresnel_dielectric(wi.dot(h), m.eta);
+    const FresnelDielectric f = fresnel_dielectric(wi.dot(h), bsdf.eta);
     if (u < setup.diffuse + setup.clearcoat + setup.specular * setup.refracted(f.reflectance)) {
       s.wo = unit(refract_about(wi, h, f));
       if (!(s.wo.z * wi.z < 0)) return s;
@@ -197,7 +208,7 @@ LobeSample sample_principled(const LobeModel& m, const PrincipledValues& v, cons
       if (!(s.wo.z * wi.z > 0)) return s;
     }
   }
-  const LobeEval e = eval_principled(m, v, wi, s.wo);
+  const LobeEval e = eval(v, wi, s.wo);
   s.pdf = e.pdf;
   if (e.pdf > 0) s.weight = e.value * (1 / e.pdf);
   return s;

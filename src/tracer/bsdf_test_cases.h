@@ -42,13 +42,7 @@ class BsdfBuilder {
   }
   /// A principled BSDF whose lobes are all left out; switch on what is wanted.
   Principled principled(float roughness) {
-    const TextureId zero = value(0);
-    Principled p{};
-    p.base_color = color(0.8f, 0.3f, 0.1f);
-    p.roughness = value(roughness);
-    p.anisotropic = p.metallic = p.spec_trans = p.spec_tint = p.sheen = p.sheen_tint = p.flatness = p.clearcoat =
-        p.clearcoat_gloss = zero;
-    return p;
+    return {.base_color = color(0.8f, 0.3f, 0.1f), .roughness = value(roughness)};
   }
   TextureId normal_map() { return color(0.62f, 0.41f, 0.93f); }
 
@@ -86,16 +80,12 @@ inline std::vector<BsdfCase> all_bsdf_cases(BsdfBuilder& b) {
   {
     Principled p = b.principled(0.5f);
     add("principled", b.add(p));
-    p.has_metallic = true;
     p.metallic = b.value(0.7f);
-    p.has_anisotropic = true;
     p.anisotropic = b.value(0.8f);
     add("principled metallic", b.add(p));
     p = b.principled(0.6f);
-    p.has_spec_trans = true;
     p.spec_trans = b.value(0.8f);
     add("principled glass", b.add(p), p.eta);
-    p.has_clearcoat = p.has_sheen = p.has_sheen_tint = p.has_flatness = p.has_spec_tint = true;
     p.clearcoat = b.value(0.9f);
     p.clearcoat_gloss = b.value(0.1f);
     p.sheen = p.sheen_tint = p.flatness = p.spec_tint = b.value(0.5f);

@@ -25,11 +25,11 @@ std::optional<PlainBsdf> Materials::Impl::find_plain(const MaterialNode& node) c
   if (two_sided && node.children[0] != node.children[1]) return {};
   const MaterialNode& n = two_sided ? compiled.nodes[node.children[0]] : node;
   if (n.type != MaterialNode::Type::lobe) return {};
-  const LobeModel& model = compiled.models[n.model];
-  if (model.type == LobeType::diffuse) return PlainBsdf{&model, n.values[0], Color(0.0f), two_sided};
-  if (model.type != LobeType::rough_plastic || !model.sample_visible || !compiled.textures.is_constant(n.values[1]))
-    return {};
-  return PlainBsdf{&model, n.values[0], compiled.textures.color(n.values[1], Vec2(0)), two_sided};
+  const auto& lobe = compiled.models[n.model].lobe;
+  if (std::holds_alternative<Lobe<Diffuse>>(lobe)) return PlainBsdf{nullptr, n.values[0], Color(0.0f), two_sided};
+  const auto* plastic = std::get_if<Lobe<RoughPlastic>>(&lobe);
+  if (!plastic || !plastic->bsdf.sample_visible || !compiled.textures.is_constant(n.values[1])) return {};
+  return PlainBsdf{plastic, n.values[0], compiled.textures.color(n.values[1], Vec2(0)), two_sided};
 }
 
 namespace {
@@ -123,47 +123,10 @@ class Resolver {
 
   void add_lobe(const MaterialNode& n, const Place& place) {
     new_lobe(place).model = n.model;
-    const LobeModel& m = m_materials.models[n.model];
-    m_scatter.smooth |= is_smooth(m.type);
-    switch (m.type) {
-      case LobeType::null:
-        break;
-      case LobeType::diffuse:
-      case LobeType::conductor:
-        put_color(n.values[0]);
-        break;
-      case LobeType::rough_conductor:
-        put_color(n.values[0]);
-        put_scalar(n.values[1]);
-        put_scalar(n.values[2]);
-        break;
-      case LobeType::dielectric:
-      case LobeType::thin_dielectric:
-      case LobeType::plastic:
-      case LobeType::rough_plastic:
-        put_color(n.values[0]);
-        put_color(n.values[1]);
-        break;
-      case LobeType::rough_dielectric:
-        put_color(n.values[0]);
-        put_color(n.values[1]);
-        put_scalar(n.values[2]);
-        put_scalar(n.values[3]);
-        break;
-      case LobeType::principled:
-        put_color(n.values[0]);
-        put_scalar(n.values[1]);
-        put_scalar(m.has_anisotropic, n.values[2]);
-        put_scalar(m.has_metallic, n.values[3]);
-        put_scalar(m.has_spec_trans, n.values[4]);
-        put_scalar(m.has_spec_tint, n.values[5]);
-        put_scalar(m.has_sheen, n.values[6]);
-        put_scalar(m.has_sheen_tint, n.values[7]);
-        put_scalar(m.has_flatness, n.values[8]);
-        put_scalar(m.has_clearcoat, n.values[9]);
-        put_scalar(m.has_clearcoat, n.values[10]);
-        break;
-    }
+    m_scatter.smooth |= n.smooth;
+    const TextureId* texture = n.values.data();
+    for (const TextureId* end = texture + n.colors; texture != end; ++texture) put_color(*texture);
+    for (const TextureId* end = texture + n.value_count - 3 * n.colors; texture != end; ++texture) put_scalar(*texture);
   }
 
   void put(float x) { m_scatter.values[m_scatter.value_count++] = x; }
@@ -176,8 +139,7 @@ class Resolver {
     put(c.y);
     put(c.z);
   }
-  void put_scalar(TextureId t) { put(m_materials.textures.scalar(t, m_point.uv)); }
-  void put_scalar(bool there, TextureId t) { put(there ? m_materials.textures.scalar(t, m_point.uv) : 0); }
+  void put_scalar(TextureId t) { put(t < 0 ? 0 : m_materials.textures.scalar(t, m_point.uv)); }
 
   /// The frame that a map starts from: along the tangents, not mirrored.
   Frame outer_frame(const Place& place) const {

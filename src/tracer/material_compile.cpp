@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-#include <tuple>
+#include <type_traits>
 
-#include "tracer/fresnel.h"
 #include "tracer/scatter.h"
 #include "warpath/error.h"
 
@@ -18,12 +16,8 @@ using Type = MaterialNode::Type;
 
 class Compiler {
  public:
-  explicit Compiler(const Scene& scene) : m_scene(scene), m_state(scene.bsdfs.size(), State::open) {
-    // An extra texture stands for reflectances that the scene leaves out.
-    std::vector<Texture> textures = scene.textures;
-    m_white = static_cast<TextureId>(textures.size());
-    textures.emplace_back(ConstantTexture{Color(1.0f)});
-    m_result.textures = TextureLookup(textures);
+  explicit Compiler(const Scene& scene)
+      : m_scene(scene), m_result{TextureLookup(scene.textures), {}, {}}, m_state(scene.bsdfs.size(), State::open) {
     m_result.nodes.resize(scene.bsdfs.size());
     m_result.models.emplace_back();  // the null lobe of masks
   }
@@ -57,21 +51,6 @@ class Compiler {
     return fmt::format("{}: bsdf \"{}\" ", m_scene.file.string(), m_scene.bsdfs[id].id);
   }
 
-  TextureId or_white(TextureId id) const { return id < 0 ? m_white : id; }
-
-  /// Makes n a lobe with these textures, three numbers each for the first `colors` and one each for the rest.
-  LobeModel& lobe(MaterialNode& n, LobeType type, std::initializer_list<TextureId> textures, int colors) {
-    WARPATH_CHECK(m_result.models.size() < 65536);
-    n.type = Type::lobe;
-    n.model = static_cast<std::uint16_t>(m_result.models.size());
-    n.value_count = 3 * colors + static_cast<int>(textures.size()) - colors;
-    std::copy(textures.begin(), textures.end(), n.values.begin());
-    for (const TextureId t : textures) uses(n, t);
-    LobeModel& m = m_result.models.emplace_back();
-    m.type = type;
-    return m;
-  }
-
   void uses(MaterialNode& n, TextureId t) const {
     WARPATH_CHECK(t >= 0 && static_cast<std::size_t>(t) < m_result.textures.size());
     if (m_result.textures.is_constant(t)) return;
@@ -86,99 +65,27 @@ class Compiler {
     }
   }
 
-  void set(MaterialNode& n, const Diffuse& d) { lobe(n, LobeType::diffuse, {d.reflectance}, 1); }
-
-  void set(MaterialNode& n, const Conductor& d) {
-    LobeModel& m = lobe(n, LobeType::conductor, {or_white(d.specular_reflectance)}, 1);
-    m.eta_conductor = d.eta;
-    m.k = d.k;
-  }
-
-  void set(MaterialNode& n, const RoughConductor& d) {
-    LobeModel& m = lobe(n, LobeType::rough_conductor, {or_white(d.specular_reflectance), d.alpha_u, d.alpha_v}, 1);
-    m.eta_conductor = d.eta;
-    m.k = d.k;
-    m.distribution = d.distribution;
-    m.sample_visible = d.sample_visible;
-    n.needs_tangents = n.anisotropic = n.tangent_frame = d.alpha_u != d.alpha_v;
-  }
-
-  void set(MaterialNode& n, const Dielectric& d) {
-    lobe(n, LobeType::dielectric, {or_white(d.specular_reflectance), or_white(d.specular_transmittance)}, 2).eta =
-        d.eta;
-  }
-
-  void set(MaterialNode& n, const ThinDielectric& d) {
-    lobe(n, LobeType::thin_dielectric, {or_white(d.specular_reflectance), or_white(d.specular_transmittance)}, 2).eta =
-        d.eta;
-  }
-
-  void set(MaterialNode& n, const RoughDielectric& d) {
-    LobeModel& m =
-        lobe(n, LobeType::rough_dielectric,
-             {or_white(d.specular_reflectance), or_white(d.specular_transmittance), d.alpha_u, d.alpha_v}, 2);
-    m.eta = d.eta;
-    m.distribution = d.distribution;
-    m.sample_visible = d.sample_visible;
-    n.needs_tangents = n.anisotropic = n.tangent_frame = d.alpha_u != d.alpha_v;
-  }
-
-  template <class P>
-  LobeModel& plastic(MaterialNode& n, LobeType type, const P& d) {
-    const TextureId specular = or_white(d.specular_reflectance);
-    LobeModel& m = lobe(n, type, {d.diffuse_reflectance, specular}, 2);
-    m.eta = d.eta;
-    m.nonlinear = d.nonlinear;
-    const float s = m_result.textures.mean(specular), sum = s + m_result.textures.mean(d.diffuse_reflectance);
-    m.specular_sampling_weight = sum > 0 ? s / sum : 0.5f;
-    return m;
-  }
-
-  void set(MaterialNode& n, const Plastic& d) {
-    plastic(n, LobeType::plastic, d).internal_reflectance = fresnel_diffuse_reflectance(1 / d.eta);
-  }
-
-  void set(MaterialNode& n, const RoughPlastic& d) {
-    LobeModel& m = plastic(n, LobeType::rough_plastic, d);
-    m.distribution = d.distribution;
-    m.sample_visible = d.sample_visible;
-    m.alpha = std::max(d.alpha, 1e-4f);
-    const auto key = std::tuple(d.distribution, m.alpha, d.eta);
-    auto found = m_interfaces.find(key);
-    if (found == m_interfaces.end())
-      found = m_interfaces.emplace(key, make_rough_interface(d.distribution, m.alpha, d.eta)).first;
-    m.transmittance = found->second.external_transmittance;
-    m.internal_reflectance = found->second.internal_reflectance;
-  }
-
-  void set(MaterialNode& n, const Principled& d) {
-    const auto& b = d;
-    const TextureId black = b.roughness;  // any: a lobe that is left out is not looked up
-    LobeModel& m = lobe(
-        n, LobeType::principled,
-        {b.base_color, b.roughness, b.has_anisotropic ? b.anisotropic : black, b.has_metallic ? b.metallic : black,
-         b.has_spec_trans ? b.spec_trans : black, b.has_spec_tint ? b.spec_tint : black, b.has_sheen ? b.sheen : black,
-         b.has_sheen_tint ? b.sheen_tint : black, b.has_flatness ? b.flatness : black,
-         b.has_clearcoat ? b.clearcoat : black, b.has_clearcoat ? b.clearcoat_gloss : black},
-        1);
-    m.eta = d.eta;
-    m.has_anisotropic = d.has_anisotropic;
-    m.has_metallic = d.has_metallic;
-    m.has_spec_trans = d.has_spec_trans;
-    m.has_spec_tint = d.has_spec_tint;
-    m.has_sheen = d.has_sheen;
-    m.has_sheen_tint = d.has_sheen_tint;
-    m.has_flatness = d.has_flatness;
-    m.has_clearcoat = d.has_clearcoat;
-    m.diffuse_rate = d.diffuse_reflectance_sampling_rate;
-    m.specular_rate = d.main_specular_sampling_rate;
-    m.clearcoat_rate = d.clearcoat_sampling_rate;
-    n.needs_tangents = n.anisotropic = n.tangent_frame = d.has_anisotropic;
-  }
-
-  void set(MaterialNode& n, const Null&) {
-    lobe(n, LobeType::null, {}, 0);
-    n.turns_to_wi = true;
+  /// Makes n a lobe.
+  template <class Bsdf>
+  void set(MaterialNode& n, const Bsdf& bsdf) {
+    WARPATH_CHECK(m_result.models.size() < 65536);
+    using L = Lobe<Bsdf>;
+    const L lobe(bsdf, m_context);
+    const LobeInputs inputs = lobe.inputs();
+    n.type = Type::lobe;
+    n.smooth = !std::is_base_of_v<DeltaLobe, L>;
+    n.model = static_cast<std::uint16_t>(m_result.models.size());
+    n.colors = static_cast<std::uint8_t>(inputs.colors.size());
+    n.value_count = kValueCount<L>;
+    const std::size_t textures = inputs.colors.size() + inputs.numbers.size();
+    WARPATH_CHECK(2 * inputs.colors.size() + textures == kValueCount<L> && textures <= n.values.size());
+    std::copy(inputs.numbers.begin(), inputs.numbers.end(),
+              std::copy(inputs.colors.begin(), inputs.colors.end(), n.values.begin()));
+    for (std::size_t i = 0; i < textures; ++i)
+      if (n.values[i] >= 0) uses(n, n.values[i]);
+    n.needs_tangents = n.anisotropic = n.tangent_frame = inputs.tangent;
+    n.turns_to_wi = std::is_same_v<Bsdf, Null>;
+    m_result.models.push_back({lobe});
   }
 
   /// Takes over what a node has in common with those it nests; `both` if their lobes are there at the same time.
@@ -240,8 +147,7 @@ class Compiler {
   const Scene& m_scene;
   CompiledMaterials m_result;
   std::vector<State> m_state;
-  TextureId m_white;
-  std::map<std::tuple<MicrofacetType, float, float>, RoughInterface> m_interfaces;
+  LobeContext m_context{m_result.textures, {}};
 };
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "scene/scene.h"
-#include "tracer/lobe.h"
+#include "tracer/lobe_model.h"
 #include "tracer/texture_lookup.h"
 
 namespace warpath {
@@ -18,11 +18,13 @@ struct MaterialNode {
   bool follows_tangent = false;                       ///< maps: what they nest is anisotropic
   bool tangent_frame = false;                         ///< a lobe below, not under a map, follows the tangent
   bool turns_to_wi = false;                           ///< every lobe below, not under a map, is twosided or null
+  bool smooth = false;                                ///< lobe: light sampling can make its directions
+  std::uint8_t colors = 0;                            ///< lobe: how many of its textures are looked up as colours
   std::uint16_t model = 0;                            ///< lobe: index into CompiledMaterials::models
   std::int32_t children[2]{-1, -1};
   TextureId texture = -1;                   ///< opacity, weight, displacement or normalmap
   float scale = 1;                          ///< bump_map
-  std::array<TextureId, 11> values{};       ///< lobe: textures in the order of its values
+  std::array<TextureId, 11> values{};       ///< lobe: its textures, those of colours first; -1 for 0
   std::array<TextureId, 2> images{-1, -1};  ///< bitmaps below, the first that at() looks up; worth prefetching
   // What the worst path through it needs of a Scatter.
   int lobes = 1, value_count = 0, perturbed = 0;

@@ -159,4 +159,9 @@ class Microfacet {
   float m_alpha_u, m_alpha_v;
 };
 
+/// Of a lobe, 0 to 1: the square root of alpha, which the eye finds even.
+inline float roughness_of_alpha(float alpha_u, float alpha_v) {
+  return clamp01(std::sqrt(std::sqrt(larger(0.0f, alpha_u * alpha_v))));
+}
+
 }  // namespace warpath

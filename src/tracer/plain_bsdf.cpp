@@ -22,8 +22,9 @@ struct Eval {
 };
 
 /// A rough plastic's parameters, the same for all vertices.
-struct RoughPlastic {
-  explicit RoughPlastic(const PlainBsdf& bsdf) : bsdf(bsdf), m(*bsdf.model), transmittance(m.transmittance.nodes()) {}
+struct Plastic {
+  explicit Plastic(const PlainBsdf& plain)
+      : plain(plain), m(plain.plastic), transmittance(m ? m->transmittance.nodes() : nullptr) {}
 
   HWY_INLINE V Transmittance(V cos_theta) const {
     constexpr int kNodes = RoughTransmittance::kNodes;
@@ -36,19 +37,19 @@ struct RoughPlastic {
 
   /// Probability of the specular lobe when `transmitted` of the light enters the base.
   HWY_INLINE V SpecularProbability(V transmitted) const {
-    const V specular = hn::Mul(hn::Sub(One(), transmitted), hn::Set(d, m.specular_sampling_weight));
-    const V sum = hn::MulAdd(transmitted, hn::Set(d, 1 - m.specular_sampling_weight), specular);
+    const V specular = hn::Mul(hn::Sub(One(), transmitted), hn::Set(d, m->specular_sampling_weight));
+    const V sum = hn::MulAdd(transmitted, hn::Set(d, 1 - m->specular_sampling_weight), specular);
     return hn::IfThenElse(hn::Gt(sum, hn::Zero(d)), hn::Div(specular, sum), One());
   }
 
   HWY_INLINE V BaseReflectance(V diffuse) const {
-    const float inv_eta2 = 1 / (m.eta * m.eta), r = m.internal_reflectance;
-    if (!m.nonlinear) return hn::Mul(diffuse, hn::Set(d, inv_eta2 / (1 - r)));
+    const float inv_eta2 = 1 / (m->bsdf.eta * m->bsdf.eta), r = m->internal_reflectance;
+    if (!m->bsdf.nonlinear) return hn::Mul(diffuse, hn::Set(d, inv_eta2 / (1 - r)));
     return hn::Div(hn::Mul(diffuse, hn::Set(d, inv_eta2)), hn::NegMulAdd(diffuse, hn::Set(d, r), One()));
   }
 
   HWY_INLINE V Fresnel(V cos_i) const {
-    const V eta = hn::Set(d, m.eta), inv2 = hn::Set(d, sqr(1 / m.eta));
+    const V eta = hn::Set(d, m->bsdf.eta), inv2 = hn::Set(d, sqr(1 / m->bsdf.eta));
     const V sin2 = hn::NegMulAdd(cos_i, cos_i, One());
     const V cos_t = hn::Sqrt(hn::Max(hn::Zero(d), hn::NegMulAdd(sin2, inv2, One())));
     const V s = hn::Mul(eta, cos_t), p = hn::Mul(eta, cos_i);
@@ -58,10 +59,10 @@ struct RoughPlastic {
 
   /// D of a microfacet normal whose angle with the normal has this cosine and this sine squared.
   HWY_INLINE V Distribution(V cosine, V sin2) const {
-    const float alpha2 = m.alpha * m.alpha;
+    const float alpha2 = m->bsdf.alpha * m->bsdf.alpha;
     const V cos2 = hn::Mul(cosine, cosine);
     V density;
-    if (m.distribution == MicrofacetType::ggx) {
+    if (m->bsdf.distribution == MicrofacetType::ggx) {
       const V sum = hn::MulAdd(cos2, hn::Set(d, alpha2), sin2);  // over alpha^2
       density = hn::Div(hn::Set(d, alpha2 / kPi), hn::Mul(sum, sum));
     } else {
@@ -74,8 +75,8 @@ struct RoughPlastic {
   HWY_INLINE V SmithG1(V cosine) const {
     const V cos2 = hn::Mul(cosine, cosine);
     const V sin2 = hn::Max(hn::Zero(d), hn::Sub(One(), cos2));
-    const V tan2 = hn::Div(hn::Mul(sin2, hn::Set(d, m.alpha * m.alpha)), cos2);
-    if (m.distribution == MicrofacetType::ggx)
+    const V tan2 = hn::Div(hn::Mul(sin2, hn::Set(d, m->bsdf.alpha * m->bsdf.alpha)), cos2);
+    if (m->bsdf.distribution == MicrofacetType::ggx)
       return hn::Div(hn::Set(d, 2.0f), hn::Add(One(), hn::Sqrt(hn::Add(One(), tan2))));
     const V a = hn::Div(One(), hn::Sqrt(tan2));
     const V over = hn::Mul(a, hn::MulAdd(a, hn::Set(d, 2.181f), hn::Set(d, 3.535f)));
@@ -100,13 +101,13 @@ struct RoughPlastic {
     const auto channel = [&](V diffuse, float spec) {
       return hn::IfThenElseZero(valid, hn::MulAdd(BaseReflectance(diffuse), base, hn::Mul(hn::Set(d, spec), surface)));
     };
-    return {{channel(reflectance.x, bsdf.specular.x), channel(reflectance.y, bsdf.specular.y),
-             channel(reflectance.z, bsdf.specular.z)},
+    return {{channel(reflectance.x, plain.specular.x), channel(reflectance.y, plain.specular.y),
+             channel(reflectance.z, plain.specular.z)},
             hn::IfThenElseZero(valid, hn::MulAdd(specular, common, hn::Mul(hn::Sub(One(), specular), cosine)))};
   }
 
-  const PlainBsdf& bsdf;
-  const LobeModel& m;
+  const PlainBsdf& plain;
+  const Lobe<RoughPlastic>* m;
   const float* transmittance;
 };
 
@@ -122,7 +123,7 @@ HWY_INLINE V3 Facing(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t 
 
 void EvalPlain(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t begin, std::size_t end, const Vec3Array& wo,
                const Vec3Array& value, float* pdf) {
-  if (bsdf.model->type == LobeType::diffuse) {
+  if (!bsdf.plastic) {
     for (std::size_t k = begin; k < end; k += hn::Lanes(d)) {
       V cos_i;
       const V3 n = Facing(bsdf, v, k, Load(v.wi, k), cos_i);
@@ -134,7 +135,7 @@ void EvalPlain(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t begin,
     }
     return;
   }
-  const RoughPlastic plastic(bsdf);
+  const Plastic plastic(bsdf);
   for (std::size_t k = begin; k < end; k += hn::Lanes(d)) {
     V cos_i;
     const V3 wi = Load(v.wi, k), n = Facing(bsdf, v, k, wi, cos_i);
@@ -145,14 +146,14 @@ void EvalPlain(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t begin,
 }
 
 /// Of the light that rough plastic reflects at its surface: few directions, so one after the other.
-HWY_INLINE void SampleSurface(const LobeModel& m, const V3& n, const V3& wi, V dir_u, V dir_v, hn::Mask<D> chosen,
+HWY_INLINE void SampleSurface(const RoughPlastic& bsdf, const V3& n, const V3& wi, V dir_u, V dir_v, hn::Mask<D> chosen,
                               V3& wo) {
   HWY_ALIGN float lanes[11][hn::MaxLanes(D())];
   const V vectors[11]{n.x, n.y, n.z, wi.x, wi.y, wi.z, dir_u, dir_v, wo.x, wo.y, wo.z};
   for (int i = 0; i < 11; ++i) hn::Store(vectors[i], d, lanes[i]);
   HWY_ALIGN std::uint8_t bits[8]{};
   hn::StoreMaskBits(d, chosen, bits);
-  const Microfacet distribution(m.distribution, m.alpha, m.alpha, true);
+  const Microfacet distribution(bsdf.distribution, bsdf.alpha, bsdf.alpha, true);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     if (!(bits[i / 8] >> i % 8 & 1)) continue;
     const Frame frame = frame_of_normal({lanes[0][i], lanes[1][i], lanes[2][i]});
@@ -165,8 +166,8 @@ HWY_INLINE void SampleSurface(const LobeModel& m, const V3& n, const V3& wi, V d
 
 void SamplePlain(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t begin, std::size_t end, const float* lobe,
                  const float* dir_u, const float* dir_v, const Vec3Array& wo, const Vec3Array& weight, float* pdf) {
-  const bool diffuse = bsdf.model->type == LobeType::diffuse;
-  const RoughPlastic plastic(bsdf);
+  const bool diffuse = !bsdf.plastic;
+  const Plastic plastic(bsdf);
   for (std::size_t k = begin; k < end; k += hn::Lanes(d)) {
     V cos_i;
     const V3 wi = Load(v.wi, k), n = Facing(bsdf, v, k, wi, cos_i), reflectance = Load(v.reflectance, k);
@@ -180,7 +181,7 @@ void SamplePlain(const PlainBsdf& bsdf, const PlainVertices& v, std::size_t begi
     } else {
       auto surface = hn::Lt(hn::LoadU(d, lobe + k), plastic.SpecularProbability(plastic.Transmittance(cos_i)));
       surface = hn::And(hn::And(surface, front), hn::FirstN(d, end - k));
-      if (!hn::AllFalse(d, surface)) SampleSurface(*bsdf.model, n, wi, u0, u1, surface, out);
+      if (!hn::AllFalse(d, surface)) SampleSurface(bsdf.plastic->bsdf, n, wi, u0, u1, surface, out);
       const Eval e = plastic(n, wi, cos_i, reflectance, out);
       p = e.pdf;
       w = e.value * hn::Div(One(), p);
@@ -202,13 +203,10 @@ HWY_EXPORT(EvalPlain);
 HWY_EXPORT(SamplePlain);
 
 Color plain_albedo(const PlainBsdf& bsdf, float cos_theta_i, const Color& reflectance) {
-  const PlasticValues values{reflectance, bsdf.specular};
-  return lobe_albedo(*bsdf.model, &values.diffuse.x, {0, 0, cos_theta_i});
+  return bsdf.plastic ? bsdf.plastic->albedo({reflectance, bsdf.specular}, {0, 0, cos_theta_i}) : reflectance;
 }
-float plain_roughness(const PlainBsdf& bsdf) { return lobe_roughness(*bsdf.model, nullptr); }
-SurfaceKind plain_kind(const PlainBsdf& bsdf) {
-  return bsdf.model->type == LobeType::diffuse ? SurfaceKind::diffuse : SurfaceKind::mixed;
-}
+float plain_roughness(const PlainBsdf& bsdf) { return bsdf.plastic ? bsdf.plastic->roughness({}) : 1; }
+SurfaceKind plain_kind(const PlainBsdf& bsdf) { return bsdf.plastic ? SurfaceKind::mixed : SurfaceKind::diffuse; }
 
 void eval_plain(const PlainBsdf& bsdf, const PlainVertices& vertices, std::size_t begin, std::size_t end,
                 const Vec3Array& wo, const Vec3Array& value, float* pdf) {

@@ -3,7 +3,7 @@
 
 #include "path/primary_source.h"
 #include "scene/scene.h"
-#include "tracer/lobe.h"
+#include "tracer/bsdf_rough_plastic.h"
 #include "tracer/vec3_array.h"
 
 namespace warpath {
@@ -12,9 +12,9 @@ namespace warpath {
 /// twosided BSDF. Many vertices of such a material are shaded at once, with SIMD; the same functions as eval_pdf_bsdf
 /// and sample_bsdf up to rounding.
 struct PlainBsdf {
-  const LobeModel* model;  ///< LobeType::diffuse, or rough_plastic with sample_visible
-  TextureId reflectance;   ///< of what is diffuse
-  Color specular;          ///< reflectance of rough plastic's surface
+  const Lobe<RoughPlastic>* plastic;  ///< with sample_visible; null: diffuse
+  TextureId reflectance;              ///< of what is diffuse
+  Color specular;                     ///< reflectance of rough plastic's surface
   bool two_sided;
 };
 

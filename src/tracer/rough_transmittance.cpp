@@ -157,4 +157,11 @@ RoughInterface make_rough_interface(MicrofacetType distribution, float alpha, fl
   return {RoughTransmittance(std::move(table)), static_cast<float>(2 * internal / kNodes)};
 }
 
+const RoughInterface& RoughInterfaces::get(MicrofacetType distribution, float alpha, float eta) {
+  const std::tuple key(distribution, alpha, eta);
+  auto found = m_made.find(key);
+  if (found == m_made.end()) found = m_made.emplace(key, make_rough_interface(distribution, alpha, eta)).first;
+  return found->second;
+}
+
 }  // namespace warpath

@@ -1,6 +1,8 @@
 #pragma once
 #include <array>
+#include <map>
 #include <memory>
+#include <tuple>
 
 #include "scene/bsdf.h"
 
@@ -32,5 +34,14 @@ struct RoughInterface {
 };
 /// Integrates the reflection and refraction of a rough interface; takes some milliseconds. eta > 0, not 1.
 RoughInterface make_rough_interface(MicrofacetType distribution, float alpha, float eta);
+
+/// Rough interfaces as they are asked for, each made once.
+class RoughInterfaces {
+ public:
+  const RoughInterface& get(MicrofacetType distribution, float alpha, float eta);
+
+ private:
+  std::map<std::tuple<MicrofacetType, float, float>, RoughInterface> m_made;
+};
 
 }  // namespace warpath
