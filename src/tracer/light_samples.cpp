@@ -65,10 +65,15 @@ void SampleRectangles(const RectangleLights& lights, std::size_t n, const Vec3Ar
   }
 }
 
+HWY_INLINE hn::Mask<D> IsZero(const V3& v) {
+  const V zero = hn::Zero(d);
+  return hn::And(hn::And(hn::Eq(v.x, zero), hn::Eq(v.y, zero)), hn::Eq(v.z, zero));
+}
+
 std::size_t MakeShadowRays(std::size_t n, const Vec3Array& position, const Vec3Array& ng, const float* time,
                            const LightSamples& samples, const Vec3Array& value, const float* bsdf_pdf,
                            const float* inv_q, const RayStream& rays, const Vec3Array& light, std::uint32_t* vertex) {
-  const V zero = hn::Zero(d), endless = hn::Set(d, std::numeric_limits<float>::max());
+  const V endless = hn::Set(d, std::numeric_limits<float>::max());
   std::size_t count = 0;
   for (std::size_t k = 0; k < n; k += hn::Lanes(d)) {
     const V pdf = hn::LoadU(d, samples.pdf + k), other = hn::LoadU(d, bsdf_pdf + k);
@@ -79,8 +84,8 @@ std::size_t MakeShadowRays(std::size_t n, const Vec3Array& position, const Vec3A
     const V3 weight = Load(samples.weight, k), f = Load(value, k);
     const V3 local{hn::Mul(hn::Mul(f.x, weight.x), scale), hn::Mul(hn::Mul(f.y, weight.y), scale),
                    hn::Mul(hn::Mul(f.z, weight.z), scale)};
-    const auto dark = hn::And(hn::And(hn::Eq(local.x, zero), hn::Eq(local.y, zero)), hn::Eq(local.z, zero));
-    const auto lit = hn::AndNot(dark, hn::FirstN(d, n - k));
+    // Where there is no sample its direction is anything, and so is the value of the BSDF.
+    const auto lit = hn::AndNot(hn::Or(IsZero(weight), IsZero(local)), hn::FirstN(d, n - k));
     if (hn::AllFalse(d, lit)) continue;
 
     const V3 p = Load(position, k), normal = Load(ng, k), wo = Load(samples.wo, k);

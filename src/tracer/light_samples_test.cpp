@@ -149,5 +149,23 @@ TEST(ShadowRays, LeaveWhereLightWouldArriveAndEndBeforeTheEmitter) {
   });
 }
 
+// What was not sampled has weight 0 and a direction that nobody set: whatever memory held.
+TEST(ShadowRays, NoneWhereThereIsNoSampleWhateverItsDirection) {
+  testing::on_every_simd_target([&] {
+    Arrays a;
+    const float nan = std::nanf(""), most = std::numeric_limits<float>::max();
+    for (std::size_t k = 0; k < kCount; ++k) {
+      a.samples.weight.set(k, Vec3(0));
+      a.samples.wo.set(k, k % 2 ? Vec3(0.6f, most, most) : Vec3(nan));
+      a.samples.distance[k] = a.samples.pdf[k] = k % 3 ? nan : kInfinity;
+      a.value.set(k, k % 2 ? Vec3(nan) : Vec3(kInfinity));
+      a.pdf[k] = k % 5 ? nan : most;
+    }
+    EXPECT_EQ(make_shadow_rays(kCount, a.from, a.ng, a.time, a.samples, a.value, a.pdf, nullptr, a.rays, a.light,
+                               a.vertex.data()),
+              0u);
+  });
+}
+
 }  // namespace
 }  // namespace warpath

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "train/flow_optimiser.h"
+#include "train/settings.h"
 #include "train/vertex_learner.h"
 #include "warp/conditional_spline.h"
 

@@ -3,6 +3,7 @@
 
 #include "core/stopwatch.h"
 #include "train/flow_optimiser.h"
+#include "train/settings.h"
 #include "train/training_data.h"
 
 namespace warpath {

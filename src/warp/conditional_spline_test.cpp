@@ -19,8 +19,10 @@ constexpr std::array kBoth{VertexDecision::light_sampling, VertexDecision::scatt
 
 /// Flows of random weights.
 ConditionalSpline example(double uniform = 0.2, const Layout& numbers = Layout::parse("bounce1.lobe+bounce1")) {
-  const ConditionalSplineSettings settings;
-  const auto shape = std::make_shared<const ConditionalSpline::Shape>(settings.flow, 3, 5);
+  SplineSettings settings;
+  settings.masks = SplineSettings::Masks::autoregressive;
+  settings.couplings = 1;
+  const auto shape = std::make_shared<const ConditionalSpline::Shape>(settings, 3, 5);
   std::array<nn::AlignedVector<float>, 2> parameters;
   std::uint32_t n = 0;
   for (auto& p : parameters) {

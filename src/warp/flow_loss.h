@@ -1,5 +1,5 @@
 #pragma once
-#include "train/settings.h"
+#include "warp/flow_settings.h"
 
 namespace warpath {
 

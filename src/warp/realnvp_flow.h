@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "nn/residual_net.h"
-#include "train/settings.h"
+#include "warp/flow_settings.h"
 #include "warp/coupling_flow.h"
 
 namespace warpath::realnvp {

@@ -1,6 +1,6 @@
 #pragma once
 #include "nn/residual_net.h"
-#include "train/settings.h"
+#include "warp/flow_settings.h"
 #include "warp/coupling_flow.h"
 
 namespace warpath::spline {
