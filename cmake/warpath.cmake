@@ -14,7 +14,7 @@ endif()
 # What every target compiles with: AVX2 at least, and no fast-math, because NaN and infinity must be seen and counted.
 add_library(warpath_flags INTERFACE)
 # GCC 12 warns of overlaps and overflows that inlined std::string and std::vector code cannot have (GCC bugs 105651, 105762).
-target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -fno-math-errno -fno-trapping-math
+target_compile_options(warpath_flags INTERFACE -march=x86-64-v3 -Wall -Wextra -Wshadow -fno-math-errno -fno-trapping-math
                                                -fno-semantic-interposition
                                                -Wno-restrict -Wno-stringop-overflow)
 

@@ -134,8 +134,8 @@ INSTANTIATE_TEST_SUITE_P(Families, Unbiased,
                                          Case{"realnvp", "bounce1+bounce2.light_uv"}, Case{"realnvp", "film"},
                                          Case{"spline", "film+bounce1"}, Case{"spline", "bounce1.lobe+bounce1"},
                                          Case{"grid", "film+bounce1.light_uv+bounce1+bounce2+bounce3+bounce4"}),
-                         [](const auto& info) {
-                           std::string name = info.param.family + "_" + info.param.dims;
+                         [](const auto& test) {
+                           std::string name = test.param.family + "_" + test.param.dims;
                            for (char& c : name)
                              if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
                            return name;
@@ -197,9 +197,9 @@ TEST(Deterministic, AnotherSeedGivesAnotherImage) {
 }
 
 TEST(Variance, OfIndependentSamplesIsWhatRepetitionsShow) {
-  constexpr int kRuns = 40, kSpp = 16;
+  constexpr int kImages = 40, kSpp = 16;
   std::vector<double> sum, sum2, predicted;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kImages; ++run) {
     ImageEstimator estimator(tracer(), {}, nullptr, 300 + static_cast<std::uint64_t>(run));
     estimator.add_pass(kSpp);
     const ImageEstimate image = estimator.develop_rest();
@@ -214,8 +214,8 @@ TEST(Variance, OfIndependentSamplesIsWhatRepetitionsShow) {
   }
   double measured = 0, expected = 0;
   for (std::size_t p = 0; p < sum.size(); ++p) {
-    measured += (sum2[p] / kRuns - sqr(static_cast<float>(sum[p] / kRuns))) * kRuns / (kRuns - 1);
-    expected += predicted[p] / kRuns;
+    measured += (sum2[p] / kImages - sqr(static_cast<float>(sum[p] / kImages))) * kImages / (kImages - 1);
+    expected += predicted[p] / kImages;
   }
   // A sample variance over n samples of a pixel knows nothing of paths that it has not met; over 3,072 pixels and 40
   // runs both sides meet the same ones. 10 % is several standard errors of this ratio.

@@ -75,7 +75,7 @@ TEST_P(FitFamilyTest, TrainedWarpsCanBeStored) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Families, FitFamilyTest, testing::Values("uniform", "grid", "kdtree", "realnvp", "spline"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(LoadProposal, SuggestsTheFamilyThatMayBeMeant) {
   TensorFile file;

@@ -63,7 +63,7 @@ INSTANTIATE_TEST_SUITE_P(Families, EveryWarp,
                          testing::Values(Case{"uniform", "independent"}, Case{"uniform", "sobol"},
                                          Case{"grid", "sobol"}, Case{"kdtree", "sobol"}, Case{"realnvp", "independent"},
                                          Case{"spline", "sobol"}, Case{"auto", "independent"}, Case{"auto", "sobol"}),
-                         [](const auto& info) { return fmt::format("{}_{}", info.param.warp, info.param.sampler); });
+                         [](const auto& test) { return fmt::format("{}_{}", test.param.warp, test.param.sampler); });
 
 TEST(Integrator, FindsBothPeaksInSixteenDimensions) {
   const auto test = make_test_function("camel", 16);

@@ -20,10 +20,10 @@ struct ImageRgb {
   std::vector<Color> pixels;
 
   ImageRgb() = default;
-  ImageRgb(int width, int height, Color fill = Color(0.0f))
-      : width(width),
-        height(height),
-        pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
+  ImageRgb(int columns, int rows, Color fill = Color(0.0f))
+      : width(columns),
+        height(rows),
+        pixels(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), fill) {}
 
   Color& at(int x, int y) { return pixels[static_cast<std::size_t>(y) * width + x]; }
   const Color& at(int x, int y) const { return pixels[static_cast<std::size_t>(y) * width + x]; }

@@ -17,8 +17,8 @@ namespace warpath {
 /// objects is walked, and read afterwards, in parallel.
 class LoadContext {
  public:
-  LoadContext(Scene& scene, const SceneOptions& options, std::vector<std::filesystem::path> folders)
-      : scene(scene), options(options), m_folders(std::move(folders)) {}
+  LoadContext(Scene& loaded, const SceneOptions& load_options, std::vector<std::filesystem::path> folders)
+      : scene(loaded), options(load_options), m_folders(std::move(folders)) {}
 
   Scene& scene;
   const SceneOptions& options;

@@ -34,9 +34,9 @@ struct Element {
   bool has_lists = false;
 
   int find(std::initializer_list<std::string_view> names) const {
-    for (const auto name : names)
+    for (const auto wanted : names)
       for (std::size_t i = 0; i < properties.size(); ++i)
-        if (properties[i].name == name) return static_cast<int>(i);
+        if (properties[i].name == wanted) return static_cast<int>(i);
     return -1;
   }
 };

@@ -261,7 +261,7 @@ TEST_P(Lights, DirectionsFollowTheirDensity) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, Lights, ::testing::ValuesIn(light_cases()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Emitters, RectangleBehindTheReferencePointGivesNothing) {
   SceneBuilder b;

@@ -23,8 +23,8 @@ struct Eval {
 
 /// A rough plastic's parameters, the same for all vertices.
 struct Plastic {
-  explicit Plastic(const PlainBsdf& plain)
-      : plain(plain), m(plain.plastic), transmittance(m ? m->transmittance.nodes() : nullptr) {}
+  explicit Plastic(const PlainBsdf& bsdf)
+      : plain(bsdf), m(bsdf.plastic), transmittance(m ? m->transmittance.nodes() : nullptr) {}
 
   HWY_INLINE V Transmittance(V cos_theta) const {
     constexpr int kNodes = RoughTransmittance::kNodes;

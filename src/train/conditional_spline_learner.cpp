@@ -74,8 +74,8 @@ bool ConditionalSplineLearner::survives(Example& example, double level) {
 
 class ConditionalSplineLearner::Recorder final : public VertexRecorder {
  public:
-  Recorder(const Layout& numbers, std::shared_ptr<const Brightness> brightness, double level)
-      : m_numbers(numbers), m_before(std::move(brightness)), m_level(level) {}
+  Recorder(const Layout& numbers, std::shared_ptr<const Brightness> before, double level)
+      : m_numbers(numbers), m_before(std::move(before)), m_level(level) {}
 
   void record(const VertexRecords& records) override {
     const std::array<bool, 2> warped{holds_decision(m_numbers, VertexDecision::light_sampling, records.bounce),
