@@ -83,9 +83,10 @@ TEST(TrainingOptions, EveryRowIsUsedByAFamilyAndRefusesNonsense) {
     for (const char* nonsense : {"nan", "1e300", "-1", "18446744073709551616", ""})
       EXPECT_THROW(option.set(nonsense, option.name), ConfigError) << option.name << " " << nonsense;
     // What is the default can be given.
-    for (const OptionUse& use : option.uses)
-      if (const std::string value = use.value.get(); !value.empty())
-        EXPECT_NO_THROW(option.set(value, option.name)) << option.name;
+    for (const OptionUse& use : option.uses) {
+      const std::string value = use.value.get();
+      EXPECT_NO_THROW(value.empty() ? void() : option.set(value, option.name)) << option.name;
+    }
   }
 }
 

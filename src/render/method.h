@@ -13,8 +13,8 @@ namespace warpath {
 struct Method {
   std::string name;                ///< as typed
   const Family* family = nullptr;  ///< null for `none`
-  Layout layout;                   ///< empty for `none`, and where the numbers of every vertex are warped
-  std::filesystem::path file;      ///< of a trained warp; empty if it is trained now
+  Layout layout{};                 ///< empty for `none`, and where the numbers of every vertex are warped
+  std::filesystem::path file{};    ///< of a trained warp; empty if it is trained now
   bool automatic = false;          ///< whether the warp is given up where it does not pay
 
   /// `none`, `auto`, or the family's.

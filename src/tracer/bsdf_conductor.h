@@ -9,7 +9,7 @@ struct Lobe<Conductor> : DeltaLobe {
   struct Values {
     Color reflectance;
   };
-  Lobe(const Conductor& bsdf, LobeContext&) : bsdf(bsdf) {}
+  Lobe(const Conductor& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const { return {{bsdf.specular_reflectance}, {}}; }
   LobeSample sample(const Values& v, const Vec3& wi, float, const Vec2&) const {
     if (!(wi.z > 0)) return {};

@@ -16,7 +16,7 @@ struct SmoothDielectricLobe : DeltaLobe {
   struct Values {
     Color reflectance, transmittance;
   };
-  SmoothDielectricLobe(const Bsdf& bsdf, LobeContext&) : bsdf(bsdf) {}
+  SmoothDielectricLobe(const Bsdf& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const { return {{bsdf.specular_reflectance, bsdf.specular_transmittance}, {}}; }
   Color albedo(const Values& v, const Vec3& wi) const {
     return dielectric_albedo(v.reflectance, v.transmittance, wi.z, bsdf.eta);

@@ -9,7 +9,7 @@ struct Lobe<Diffuse> {
   struct Values {
     Color reflectance;
   };
-  Lobe(const Diffuse& bsdf, LobeContext&) : bsdf(bsdf) {}
+  Lobe(const Diffuse& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const { return {{bsdf.reflectance}, {}}; }
   LobeEval eval(const Values& v, const Vec3& wi, const Vec3& wo) const {
     if (!(wi.z > 0 && wo.z > 0)) return {};

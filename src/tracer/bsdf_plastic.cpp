@@ -6,7 +6,7 @@
 namespace warpath {
 
 template <class Bsdf>
-PlasticLobe<Bsdf>::PlasticLobe(const Bsdf& bsdf, const TextureLookup& textures) : bsdf(bsdf) {
+PlasticLobe<Bsdf>::PlasticLobe(const Bsdf& description, const TextureLookup& textures) : bsdf(description) {
   const float s = textures.mean(bsdf.specular_reflectance), sum = s + textures.mean(bsdf.diffuse_reflectance);
   specular_sampling_weight = sum > 0 ? s / sum : 0.5f;
 }
@@ -21,7 +21,7 @@ Color PlasticLobe<Bsdf>::albedo_of(const Values& v, float transmitted) const {
 template struct PlasticLobe<Plastic>;
 template struct PlasticLobe<RoughPlastic>;
 
-Lobe<Plastic>::Lobe(const Plastic& bsdf, LobeContext& context) : PlasticLobe(bsdf, context.textures) {
+Lobe<Plastic>::Lobe(const Plastic& description, LobeContext& context) : PlasticLobe(description, context.textures) {
   internal_reflectance = fresnel_diffuse_reflectance(1 / bsdf.eta);
 }
 

@@ -10,7 +10,7 @@ struct Lobe<Principled> {
     float roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat,
         clearcoat_gloss;
   };
-  Lobe(const Principled& bsdf, LobeContext&) : bsdf(bsdf) {}
+  Lobe(const Principled& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const;
   LobeEval eval(const Values& v, const Vec3& wi, const Vec3& wo) const;
   LobeSample sample(const Values& v, const Vec3& wi, float u, const Vec2& dir) const;

@@ -11,7 +11,7 @@ struct Lobe<RoughConductor> {
     Color reflectance;
     float alpha_u, alpha_v;
   };
-  Lobe(const RoughConductor& bsdf, LobeContext&) : bsdf(bsdf) {}
+  Lobe(const RoughConductor& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const {
     return {{bsdf.specular_reflectance}, {bsdf.alpha_u, bsdf.alpha_v}, bsdf.alpha_u != bsdf.alpha_v};
   }

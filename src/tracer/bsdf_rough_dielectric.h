@@ -10,7 +10,7 @@ struct Lobe<RoughDielectric> {
     Color reflectance, transmittance;
     float alpha_u, alpha_v;
   };
-  Lobe(const RoughDielectric& bsdf, LobeContext&) : bsdf(bsdf) {}
+  Lobe(const RoughDielectric& description, LobeContext&) : bsdf(description) {}
   LobeInputs inputs() const {
     return {{bsdf.specular_reflectance, bsdf.specular_transmittance},
             {bsdf.alpha_u, bsdf.alpha_v},
