@@ -82,7 +82,8 @@ class Bench:
         self.warpath = self.build / "warpath"
 
     def make(self):
-        for command in (["cmake", "-G", "Ninja", "-S", HERE.parent, "-B", self.build, "-DWARPATH_BENCH=ON"], ["ninja", "-C", self.build, "warpath", "benchmarks"]):
+        configure = ["cmake", "-G", "Ninja", "-S", HERE.parent, "-B", self.build, "-DWARPATH_BENCH=ON"]
+        for command in (configure, ["ninja", "-C", self.build, "warpath", "benchmarks"]):
             subprocess.run(command, check=True, stdout=sys.stderr)
 
     def rows(self, task):

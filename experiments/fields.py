@@ -75,10 +75,12 @@ def references_of_own_scenes(experiment):
     small = {"size": "160x90", "max_depth": 6}
     films = {"box": small, "study": small, "ajar": {"size": "160x90"}, "billiards": small, "gallery": small}
     for name, film in films.items():
-        yield name, own_scene(name), {**film, **render_reference(f"{experiment}/references/{name}", own_scene(name), 2048, objective="relmse", **film)}
+        label = f"{experiment}/references/{name}"
+        yield name, own_scene(name), {**film, **render_reference(label, own_scene(name), 2048, objective="relmse", **film)}
     film = {**small, "max_depth": 4, "defines": {"bulb": 7}}
     label = f"{experiment}/references/coins"
-    yield "coins", own_scene("coins"), {**film, **render_reference(label, own_scene("coins"), 2048, "kdtree:film+bounce1", examples=640000, uniform=0.3, **film)}
+    kdtree = {"examples": 640000, "uniform_share": 0.3}
+    yield "coins", own_scene("coins"), {**film, **render_reference(label, own_scene("coins"), 2048, "kdtree:film+bounce1", **kdtree, **film)}
 
 
 def field_own_scenes():
@@ -145,7 +147,10 @@ def views():
 
 
 def conditional():
-    """Warps of the first hit over a stratified film, for both objectives: kd-trees in tiles of it, spline flows, the field; chi-squared against KL."""
+    """Warps of the first hit over a stratified film, for both objectives: kd-trees in tiles of it, spline flows, the field.
+
+    Chi-squared against KL.
+    """
     tables, measure = {}, {**FILM, "spp": 128, "runs": 3}
     warps = [f"{family}:{dims}" for dims in (FIRST_HIT, ALL_OF_FIRST_HIT) for family in ("conditional-kdtree", "conditional-spline")]
     warps.append(f"field:{ALL_OF_FIRST_HIT}")

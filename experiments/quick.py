@@ -110,7 +110,8 @@ def memory():
     """A candidate costs 4 bytes: many of them for few examples take hardly more memory than few."""
     scene, film = own_scene("box"), {"size": "64x48", "max_depth": 2}
     counts = (200_000, 5_200_000)
-    peaks = [train("quick/memory", scene, f"realnvp:{FILM_12D}", **film, examples=10000, alpha=n / 10000, couplings=1, max_steps=1)[2] for n in counts]
+    training = {"examples": 10000, "couplings": 1, "max_steps": 1}
+    peaks = [train("quick/memory", scene, f"realnvp:{FILM_12D}", **film, **training, alpha=n / 10000)[2] for n in counts]
     bytes_each = (peaks[1] - peaks[0]) / (counts[1] - counts[0])
     yield f"a candidate takes {bytes_each:.1f} bytes, less than 6", bytes_each < 6
 

@@ -52,7 +52,8 @@ def machine():
 
 def record_of_bench(name, command, tables, settings=""):
     """The same of a benchmark in bench/, which runs what this checkout holds: as text."""
-    build = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=12"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+    describe = ["git", "describe", "--always", "--dirty", "--abbrev=12"]
+    build = subprocess.run(describe, cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
     version = re.search(r"project\(warpath VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
     about = {"experiment": name, "command": command, "version": version, "build": build, "date": time.strftime("%Y-%m-%d", time.gmtime()),
              "machine": machine(), "settings": settings}  # fmt: skip

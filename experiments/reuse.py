@@ -65,7 +65,8 @@ def retrain(label, scene, weights, angles, all_steps, loss_name, tolerance, **tr
                 losses.setdefault(start, []).append((steps, *loss))
                 gains.setdefault(start, []).append((steps, *gained))
                 seconds = mean([run["train_cpu_seconds"] for run in runs])
-                rows.append({"turned": f"{angle}°", "training": start, "steps": steps, "train_cpu_seconds": seconds, "held_out": loss, "mse_over_uniform": gained})
+                rows.append({"turned": f"{angle}°", "training": start, "steps": steps, "train_cpu_seconds": seconds,
+                             "held_out": loss, "mse_over_uniform": gained})  # fmt: skip
         folder = folder_of(f"{label}/{angle}")
         line_chart(folder / "loss.svg", "training steps", f"held-out loss, {loss_name}", losses)
         line_chart(folder / "gain.svg", "training steps", "gain in MSE over uniform", gains, rule=1)

@@ -97,8 +97,9 @@ def published_realnvp():
     """Real NVP trained as published: separate networks, no encoding, batch normalisation, maximum likelihood."""
     tables = {}
     for name in BOTH:
-        results = compare(f"published-realnvp/{name}", shared_scene(name), ["none", UNIFORM, REALNVP], **PAPER, **reference(name), loss="likelihood",
-                          networks="separate", encoding_bins=0, masks="alternating", bn="batch", couplings=8, width=64, rate=1e-3, jitter=0)  # fmt: skip
+        results = compare(f"published-realnvp/{name}", shared_scene(name), ["none", UNIFORM, REALNVP], **PAPER, **reference(name),
+                          loss="likelihood", networks="separate", encoding_bins=0, masks="alternating", bn="batch",
+                          couplings=8, width=64, rate=1e-3, jitter=0)  # fmt: skip
         tables[name] = rows_of(results)
     write_record("published-realnvp", tables, PAPER)
 
@@ -117,7 +118,8 @@ def training_time():
         lines[family].append((seconds, gained))
         rows.append({"method": f"{family}:film+bounce1", "label": budget, "train_cpu_seconds": seconds, "mse_gain": gained})
     write_record("training-time", {"country-kitchen": rows}, measure)
-    line_chart(folder_of("training-time") / "gain.svg", "CPU seconds of training, candidates included", "gain in MSE over plain path tracing", lines, rule=1)
+    axes = "CPU seconds of training, candidates included", "gain in MSE over plain path tracing"
+    line_chart(folder_of("training-time") / "gain.svg", *axes, lines, rule=1)
 
 
 def twelve_dims(epps=(1, 4, 16, 64, 256)):
@@ -148,7 +150,8 @@ def twelve_dims(epps=(1, 4, 16, 64, 256)):
     _, _, memory = train("twelve-dims/memory", own_scene("box"), f"realnvp:{TWELVE}", size="64x48", max_depth=2,
                          examples=4096 * 200 * 160, alpha=1, max_steps=100)  # fmt: skip
     count = 8 * 4096 * 200 * 160
-    rows.append({"training set": "epp-4096, not trained", "candidates": count, "candidate_cpu_seconds": count * cost, "peak_memory": round(memory / 1e6)})
+    rows.append({"training set": "epp-4096, not trained", "candidates": count, "candidate_cpu_seconds": count * cost,
+                 "peak_memory": round(memory / 1e6)})  # fmt: skip
     write_record("twelve-dims", {"country-kitchen": rows}, options)
     line_chart(folder_of("twelve-dims") / "gain.svg", "training set, epp", "gain in MSE over plain path tracing", {"realnvp, 12D": line}, rule=1)
 

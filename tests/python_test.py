@@ -26,7 +26,12 @@ needed = pip_install("nanobind>=2.4", "scikit-build-core>=0.10", "numpy", "pytes
 if needed.returncode != 0:
     print("skipped: what the Python package is built with cannot be installed here:", needed.stderr.strip().splitlines()[-1:])
     sys.exit(77)
-for peer, tests in {"vegas==6.4.1": "the test of its decorators is", "mitsuba==3.9.1": "the tests of warpath.mitsuba are", "matplotlib": "the tutorial is"}.items():
+peers = {
+    "vegas==6.4.1": "the test of its decorators is",
+    "mitsuba==3.9.1": "the tests of warpath.mitsuba are",
+    "matplotlib": "the tutorial is",
+}
+for peer, tests in peers.items():
     if pip_install(peer).returncode != 0:
         print(f"{peer} cannot be installed here, so {tests} skipped")
 package = pip_install("--no-build-isolation", f"-Cbuild-dir={build / 'python_package'}", str(source))
@@ -39,5 +44,6 @@ for command in (["cmake", "-S", source, "-B", build, "-DWARPATH_PYTHON=ON", f"-D
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(done.stdout + done.stderr)
-sys.exit(subprocess.run([python, "-m", "pytest", "-rs", source / "python" / "tests", "--pyargs", "warpath", "--doctest-modules", "--doctest-ignore-import-errors", "-p", "no:cacheprovider"],
-                        cwd=build, env=os.environ | {"WARPATH_BINARY": str(build / "warpath"), "WARPATH_SOURCE": str(source)}).returncode)
+pytest = ["pytest", "-rs", source / "python" / "tests", "--pyargs", "warpath", "--doctest-modules", "--doctest-ignore-import-errors"]
+found = os.environ | {"WARPATH_BINARY": str(build / "warpath"), "WARPATH_SOURCE": str(source)}
+sys.exit(subprocess.run([python, "-m", *pytest, "-p", "no:cacheprovider"], cwd=build, env=found, check=False).returncode)

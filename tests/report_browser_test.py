@@ -190,8 +190,8 @@ class ReportTest(unittest.TestCase):
 
     def check_everywhere(self, page):
         """What holds for every report."""
-        unlabelled = "[...document.querySelectorAll('main canvas, main svg')].filter(n => !n.getAttribute('aria-label') && n.getAttribute('aria-hidden') !== 'true').length"
-        self.assertEqual(page.evaluate(unlabelled), 0)
+        unlabelled = "n => !n.getAttribute('aria-label') && n.getAttribute('aria-hidden') !== 'true'"
+        self.assertEqual(page.evaluate(f"[...document.querySelectorAll('main canvas, main svg')].filter({unlabelled}).length"), 0)
         self.assertEqual(page.evaluate("(ids => ids.length - new Set(ids).size)([...document.querySelectorAll('[id]')].map(n => n.id))"), 0)
         self.assertNotRegex(page.evaluate("document.querySelector('main').innerText"), r"undefined|NaN|\[object|Infinity")
         for width in (1440, 420):
@@ -223,7 +223,8 @@ class ReportTest(unittest.TestCase):
         first = {}
         for run in results:
             first.setdefault(run["method"], sum(run["mean"]) / 3)
-        shown = page.evaluate("[...document.querySelectorAll('.stage canvas')].map(c => [c.getAttribute('aria-label'), +c.dataset.mean, +c.dataset.lit])")
+        facts = "c => [c.getAttribute('aria-label'), +c.dataset.mean, +c.dataset.lit]"
+        shown = page.evaluate(f"[...document.querySelectorAll('.stage canvas')].map({facts})")
         self.assertEqual(len(shown), 5)
         for label, mean, lit in shown:
             self.assertGreater(lit, 0.95, f"{label}: the canvas is black")
@@ -262,7 +263,8 @@ class ReportTest(unittest.TestCase):
 
     def test_pointer_zooms_all_panels_and_tells_values(self):
         page = self.open("full")
-        x, y = page.evaluate("(b => [b.x + b.width / 2, b.y + b.height / 2])((n => (n.scrollIntoView(), n.getBoundingClientRect()))(document.querySelector('.stage')))")
+        box = "(n => (n.scrollIntoView(), n.getBoundingClientRect()))(document.querySelector('.stage'))"
+        x, y = page.evaluate(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({box})")
         page.send("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-480)
         page.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         page.settle()
@@ -313,8 +315,9 @@ class ReportTest(unittest.TestCase):
         self.assertIn("No reference was given", page.evaluate("document.querySelector('.notices').innerText"))
         self.assertNotIn("MSE", page.evaluate("document.querySelector('#results table').innerText"))
         self.assertEqual(page.evaluate(SHOWN), "12")
-        magenta = PIXELS + "(document.querySelector('.stage canvas')).some((v, i, d) => i % 4 === 0 && v === 255 && d[i + 1] === 0 && d[i + 2] === 255)"
-        self.assertTrue(page.evaluate(magenta), "a pixel that is not a number is magenta")
+        magenta = "(v, i, d) => i % 4 === 0 && v === 255 && d[i + 1] === 0 && d[i + 2] === 255"
+        shown = page.evaluate(f"{PIXELS}(document.querySelector('.stage canvas')).some({magenta})")
+        self.assertTrue(shown, "a pixel that is not a number is magenta")
         self.check_everywhere(page)
 
     def test_one_method(self):

@@ -34,9 +34,11 @@ RENDERS = {
     "kdtree-light": (BOX, "--warp kdtree:bounce1.light_uv --spp 4 --examples 4000"),
     "realnvp": (BOX, "--warp realnvp:film+bounce1 --spp 4 --examples 4000 --max-steps 60"),
     "realnvp-options": (BOX, "--warp realnvp:film+bounce1 --spp 4 --examples 4000 --max-steps 60 --couplings 4 --width 16 --blocks 2 "
-                             "--encoding-bins 7 --rate 0.004 --jitter 1 --batch 512 --loss likelihood --masks alternating --networks separate --bn batch"),
+                             "--encoding-bins 7 --rate 0.004 --jitter 1 --batch 512 --loss likelihood --masks alternating "
+                             "--networks separate --bn batch"),
     "spline": (BOX, "--warp spline:film+bounce1 --spp 4 --examples 4000 --max-steps 150"),
-    "spline-options": (BOX, f"--warp spline:film+{FIRST_HIT} --spp 4 --examples 4000 --max-steps 60 --couplings 4 --width 16 --bins 6 --uniform-share 0.2"),
+    "spline-options": (BOX, f"--warp spline:film+{FIRST_HIT} --spp 4 --examples 4000 --max-steps 60 --couplings 4 --width 16 --bins 6 "
+                            "--uniform-share 0.2"),
     "conditional-kdtree": (STUDY, f"--warp conditional-kdtree:{FIRST_HIT} --spp 12 --max-depth 5"),
     "conditional-spline": (STUDY, f"--warp conditional-spline:{FIRST_HIT} --spp 6 --max-depth 5"),
     "field": (AJAR, "--warp field --spp 24 --max-depth 6"),
@@ -95,7 +97,13 @@ class Runs:
         runs = json.loads((self.folder / "report" / "results.json").read_text())["results"]
         yield "compare", digest([[run[key] for key in ("method", "seed", "mse", "relmse", "mse_rest", "mse_predicted", "mean")] for run in runs])
         # What a clock decided differs from call to call, so the passes that are rendered again are given.
-        passes = [(1, 2, True, "none", ""), (1, 2, False, "none", ""), (2, 3, True, "none", ""), (4, 5, True, "field", "field"), (6, 7, False, "field", "")]
+        passes = [
+            (1, 2, True, "none", ""),
+            (1, 2, False, "none", ""),
+            (2, 3, True, "none", ""),
+            (4, 5, True, "field", "field"),
+            (6, 7, False, "field", ""),
+        ]
         keys = ("spp", "batches", "teaches", "drawn_by", "chosen")
         run = {"method": "auto", "size": "48x32", "seed": 5, "passes": [dict(zip(keys, p)) for p in passes]}
         recorded = self.folder / "recorded.json"

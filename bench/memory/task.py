@@ -14,12 +14,13 @@ def rows(bench):
     with tempfile.TemporaryDirectory() as folder:
 
         def ours(size, spp):
-            command = [bench.warpath, "render", scene, "--warp", "none", "--size", size, "--spp", spp, "--threads", "2", "--quiet", "-o", Path(folder) / "image.exr"]
-            return run_and_measure(command)[1]
+            options = ["--warp", "none", "--size", size, "--spp", spp, "--threads", "2", "--quiet"]
+            return run_and_measure([bench.warpath, "render", scene, *options, "-o", Path(folder) / "image.exr"])[1]
 
         used = {(size, spp): ours(size, spp) for size, spp in ((SIZE, 4), (SIZE, 64), (LARGE, 1), (LARGE, 4))}
     for size, spp in ((SIZE, 4), (LARGE, 1)):
         theirs = bench.mitsuba(HERE / "mitsuba3.py", "scalar_rgb", scene, size, spp)["bytes"]
-        yield Row(f"{size}, over Mitsuba's scalar_rgb", used[size, spp] / theirs, "×", Bound(most=1.0), f"{used[size, spp] / MiB:.0f} MiB, {theirs / MiB:.0f} MiB there")
+        note = f"{used[size, spp] / MiB:.0f} MiB, {theirs / MiB:.0f} MiB there"
+        yield Row(f"{size}, over Mitsuba's scalar_rgb", used[size, spp] / theirs, "×", Bound(most=1.0), note)
     yield Row(f"{SIZE}, 64 spp over 4 spp", used[SIZE, 64] / used[SIZE, 4], "×", Bound(most=1.02))
     yield Row(f"{LARGE}, 4 spp over 1 spp", used[LARGE, 4] / used[LARGE, 1], "×", Bound(most=1.02))

@@ -17,9 +17,14 @@ def rows(bench):
     for kind, least in (("forward", 0.90), ("train/floats", 0.80), ("train/fastest", 0.80)):
         for width in WIDTHS:
             row = ours[f"{kind}/{width}"]
-            yield Row(f"{kind}, {width} wide, of the FMA peak", row["of_peak"], "", Bound(least=least), f"{row['cpu_time'] / samples[kind]:.0f} ns a sample, peak {row['peak_GFLOP/s']:.0f} GFLOP/s")
+            note = f"{row['cpu_time'] / samples[kind]:.0f} ns a sample, peak {row['peak_GFLOP/s']:.0f} GFLOP/s"
+            yield Row(f"{kind}, {width} wide, of the FMA peak", row["of_peak"], "", Bound(least=least), note)
     nanoseconds = {kind: {width: ours[f"{kind}/{width}"]["cpu_time"] / samples[kind] for width in WIDTHS} for kind in samples}
-    for name, peer in (("oneDNN", lambda: {"forward": bench.json(bench.binary("nn_onednn"), environment={"OMP_NUM_THREADS": "1"})}), ("PyTorch", lambda: bench.torch(HERE / "pytorch.py"))):
+    peers = {
+        "oneDNN": lambda: {"forward": bench.json(bench.binary("nn_onednn"), environment={"OMP_NUM_THREADS": "1"})},
+        "PyTorch": lambda: bench.torch(HERE / "pytorch.py"),
+    }
+    for name, peer in peers.items():
         try:
             theirs = peer()
         except Missing as missing:
@@ -28,4 +33,5 @@ def rows(bench):
         for kind in theirs:
             for width in WIDTHS:
                 ours_of_kind = "forward" if kind == "forward" else "train/fastest"
-                yield Row(f"{kind}, {width} wide, speed over {name}", theirs[kind][str(width)] / nanoseconds[ours_of_kind][width], "×", LEAST_SPEED.get(kind))
+                speed = theirs[kind][str(width)] / nanoseconds[ours_of_kind][width]
+                yield Row(f"{kind}, {width} wide, speed over {name}", speed, "×", LEAST_SPEED.get(kind))

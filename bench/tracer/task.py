@@ -16,6 +16,8 @@ def rows(bench):
         peers = {variant: bench.mitsuba(HERE / "mitsuba3.py", variant, file, SIZE, SPP, THREADS) for variant in BOUNDS}
         again = render()  # before and after the peers: machines drift
         best = min(first["seconds"] + again["seconds"])
-        yield Row(f"{scene}, paths per second", first["paths"] / best / 1e6, "million", note=f"{min(first['cpu_seconds'] + again['cpu_seconds']) / first['paths'] * 1e6:.2f} µs of CPU a path")
+        cpu = min(first["cpu_seconds"] + again["cpu_seconds"]) / first["paths"]
+        yield Row(f"{scene}, paths per second", first["paths"] / best / 1e6, "million", note=f"{cpu * 1e6:.2f} µs of CPU a path")
         for variant, peer in peers.items():
-            yield Row(f"{scene}, speed over Mitsuba's {variant}", min(peer["seconds"]) / best, "×", BOUNDS[variant], f"{min(peer['cpu_seconds']) / peer['paths'] * 1e6:.2f} µs of CPU a path there")
+            note = f"{min(peer['cpu_seconds']) / peer['paths'] * 1e6:.2f} µs of CPU a path there"
+            yield Row(f"{scene}, speed over Mitsuba's {variant}", min(peer["seconds"]) / best, "×", BOUNDS[variant], note)

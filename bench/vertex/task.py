@@ -10,4 +10,5 @@ def rows(bench):
     for name, most in MOST.items():
         row = results[f"draw/{name}"]
         first = row["locate"] + max(row["light"], row["scatter"])
-        yield Row(f"{name}, three numbers", first, "ns", most and Bound(most=most), f"{row['ns/vertex']:.0f} ns for six; {row['peak_GFLOP/s']:.0f} GFLOP/s peak")
+        note = f"{row['ns/vertex']:.0f} ns for six; {row['peak_GFLOP/s']:.0f} GFLOP/s peak"
+        yield Row(f"{name}, three numbers", first, "ns", most and Bound(most=most), note)

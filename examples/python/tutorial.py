@@ -45,7 +45,8 @@ integrator = warpath.Integrator([(0, 1)] * 4)
 adaptation = integrator(two_peaks, nitn=6, neval=20_000)
 result = integrator(two_peaks, nitn=5, neval=20_000, adapt=False)
 print(result.summary())
-print(f"measured {result}, exactly {exact:.6g}; {integrator.warp} draws; {result.effective_samples:.0f} of {result.itn_results[-1].neval} points are effective")
+print(f"measured {result}, exactly {exact:.6g}; {integrator.warp} draws")
+print(f"{result.effective_samples:.0f} of {result.itn_results[-1].neval} points are effective")
 
 # %% [markdown]
 # The error of each iteration falls while the warp learns, and the points gather where the function is.
@@ -68,6 +69,8 @@ keep(figure, "first-integral")
 # covariance gives the error of the ratio. The warp adapts to the first of them.
 
 # %%
+
+
 def moon(x):
     """A thin crescent, and its first moments."""
     radius = np.hypot(x[:, 0], x[:, 1])
@@ -100,10 +103,12 @@ keep(figure, "own-integrand")
 # %% [markdown]
 # ## 3. When it does not help
 #
-# A peak that holds a millionth of the volume: the first points do not meet it, and an integrator can only learn from what it has seen. The signs are a
-# Q below 0.05, iterations that jump, and few effective samples.
+# A peak that holds a millionth of the volume: the first points do not meet it, and an integrator can only learn from what it has seen. The
+# signs are a Q below 0.05, iterations that jump, and few effective samples.
 
 # %%
+
+
 def needle(x):
     return np.exp(-(((x - 0.62) / 0.004) ** 2).sum(axis=1))
 
@@ -146,9 +151,10 @@ keep(figure, "does-not-help")
 # %% [markdown]
 # ## 4. A scene of Mitsuba 3
 #
-# A renderer is a function of random numbers too. `warpath.mitsuba` trains a warp of some of them (here the film position and the direction of the first
-# bounce) and renders with it; scene and integrator stay as they are. The LLVM variant is for real use; the scalar one needs nothing
-# but patience, so the picture is small. With the film among the warped numbers bright regions get more samples: MSE falls, relative error in the dark may not.
+# A renderer is a function of random numbers too. `warpath.mitsuba` trains a warp of some of them (here the film position and the direction
+# of the first bounce) and renders with it; scene and integrator stay as they are. The LLVM variant is for real use; the scalar one needs
+# nothing but patience, so the picture is small. With the film among the warped numbers bright regions get more samples: MSE falls, relative
+# error in the dark may not.
 
 # %%
 try:
@@ -183,4 +189,5 @@ if mi:
         print(f"{name}: mean {image.mean():.4f}, MSE {np.mean((image - reference) ** 2):.3g}")
 
 # %% [markdown]
-# What next: [Integrate any function](../../docs/integrate.md), the [user guide](../../docs/guide.md) for the renderer of the project, the [API](../../docs/api.md).
+# What next: [Integrate any function](../../docs/integrate.md), the [user guide](../../docs/guide.md) for the renderer of the project, the
+# [API](../../docs/api.md).

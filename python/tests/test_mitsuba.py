@@ -52,13 +52,15 @@ def agree(ours, theirs):
 def test_the_expectation_is_that_of_mitsuba(integrator, warp):
     scene = box(integrator)
     trained = warp if warp == "none" else warpath.mitsuba.train(scene, warp, epp=0.02)
-    agree(images(lambda seed: warpath.mitsuba.render(scene, SPP, trained, seed=seed)), images(lambda seed: mi.render(scene, spp=SPP, seed=1000 + seed)))
+    ours = images(lambda seed: warpath.mitsuba.render(scene, SPP, trained, seed=seed))
+    agree(ours, images(lambda seed: mi.render(scene, spp=SPP, seed=1000 + seed)))
 
 
 def test_lens_and_time_can_be_warped():
     scene = box(sensor="thinlens", aperture_radius=0.1, focus_distance=4.0, shutter_open=0.0, shutter_close=1.0)
     trained = warpath.mitsuba.train(scene, "kdtree:film+lens+time", epp=0.02)
-    agree(images(lambda seed: warpath.mitsuba.render(scene, SPP, trained, seed=seed)), images(lambda seed: mi.render(scene, spp=SPP, seed=1000 + seed)))
+    ours = images(lambda seed: warpath.mitsuba.render(scene, SPP, trained, seed=seed))
+    agree(ours, images(lambda seed: mi.render(scene, spp=SPP, seed=1000 + seed)))
 
 
 def columns(order, questions):
@@ -131,6 +133,9 @@ for warp in ("none", "kdtree:film+bounce1"):
 """
 
 
-@pytest.mark.skipif("DRJIT_LIBLLVM_PATH" not in os.environ, reason="DRJIT_LIBLLVM_PATH is not set; LLVM before 19 ends the process on CPUs with AVX-512")
+@pytest.mark.skipif(
+    "DRJIT_LIBLLVM_PATH" not in os.environ,
+    reason="DRJIT_LIBLLVM_PATH is not set; LLVM before 19 ends the process on CPUs with AVX-512",
+)
 def test_in_wavefronts():
     subprocess.run([sys.executable, "-c", LLVM], check=True, cwd=os.path.dirname(__file__))

@@ -9,8 +9,8 @@ import numpy as np
 
 from .training import Warp, training_options
 
-_MISSING = ("this installation has no renderer: install what packages.txt lists (on Debian 12: ./run does), then `pip install . -Ccmake.define.WARPATH_RENDERER=ON` "
-            "in a clone")
+_MISSING = ("this installation has no renderer: install what packages.txt lists (on Debian 12: ./run does), then "
+            "`pip install . -Ccmake.define.WARPATH_RENDERER=ON` in a clone")
 
 
 def _module():

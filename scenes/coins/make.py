@@ -36,7 +36,8 @@ def domed_ring():
 
 def wire_ring():
     """A thin ring of round wire: radius 1, thickness 0.16."""
-    return revolve([[(1.0 + 0.08 * math.cos(t), 0.08 + 0.08 * math.sin(t)) for t in [2 * math.pi * i / 14 - math.pi / 2 for i in range(15)]]], SEGMENTS)
+    angles = [2 * math.pi * i / 14 - math.pi / 2 for i in range(15)]
+    return revolve([[(1.0 + 0.08 * math.cos(t), 0.08 + 0.08 * math.sin(t)) for t in angles]], SEGMENTS)
 
 
 def coin():

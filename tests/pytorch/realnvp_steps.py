@@ -79,11 +79,11 @@ class Flow(torch.nn.Module):
     def named(self):
         for c, nets in enumerate(self.nets):
             for name, net in zip(["st"] if self.shared else ["s", "t"], nets):
-                for l in range(len(net.weight)):
-                    yield f"coupling{c}.{name}.layer{l}.weight", net.weight[l]
-                    yield f"coupling{c}.{name}.layer{l}.bias", net.bias[l]
-                    if l < len(net.gain):
-                        yield f"coupling{c}.{name}.layer{l}.gain", net.gain[l]
+                for k in range(len(net.weight)):
+                    yield f"coupling{c}.{name}.layer{k}.weight", net.weight[k]
+                    yield f"coupling{c}.{name}.layer{k}.bias", net.bias[k]
+                    if k < len(net.gain):
+                        yield f"coupling{c}.{name}.layer{k}.gain", net.gain[k]
             yield f"coupling{c}.scale", self.scales[c]
 
 
