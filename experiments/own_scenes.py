@@ -11,7 +11,7 @@ from tool import compare, crop, folder_of, own_scene, render_reference
 FILM = {"size": "160x90", "max_depth": 6}
 SIZES = {**FILM, "spp": 128, "runs": 5}
 # Where a network misses a caustic, a highlight in motion or a light, its samples weigh up to 1 / this many times what a uniform one does.
-SHARE = {"uniform": 0.3}
+SHARE = {"uniform_share": 0.3}
 WARPS_4D = ["kdtree:film+bounce1", "realnvp:film+bounce1"]
 #: Gains in MSE of Real NVP over plain path tracing on rings and coins, by the size of the training set [ZZ19].
 PUBLISHED = {1: 1.35, 4: 1.63, 64: 1.84}

@@ -66,12 +66,12 @@ def stored_reference(name):
     return {"reference": image} if fits and image.exists() else {}
 
 
-#: Families that mix in a share of uniform samples that --uniform sets.
+#: Families that mix in a share of uniform samples that --uniform-share sets.
 MIXED = ("grid", "kdtree", "realnvp", "spline", "conditional-kdtree", "conditional-spline")
 
 
 def mixes(methods):
-    """Whether --uniform is for any of these methods: the command line refuses options that none of them uses."""
+    """Whether --uniform-share is for any of these methods: the command line refuses options that none of them uses."""
     return any(str(method).partition(":")[0] in MIXED for method in methods)
 
 
@@ -84,8 +84,9 @@ def arguments(options, fixed=(), methods=()):
             words += [word for key, item in value.items() for word in ("-D", f"{key}={item}")]
         else:
             words += [f"--{name.replace('_', '-')}", str(value if name in fixed else SETTINGS.overrides.get(name, value))]
-    everywhere = [key for key in ("seed", *(["uniform"] if mixes(methods) else [])) if key in SETTINGS.overrides and key not in (*options, *fixed)]
-    return words + [word for key in everywhere for word in (f"--{key}", SETTINGS.overrides[key])]
+    everywhere = ("seed", "uniform_share") if mixes(methods) else ("seed",)
+    more = [key for key in everywhere if key in SETTINGS.overrides and key not in (*options, *fixed)]
+    return words + [word for key in more for word in (f"--{key.replace('_', '-')}", SETTINGS.overrides[key])]
 
 
 def crop(options, x, y, width, height):
@@ -157,7 +158,7 @@ def train(label, scene, warp, **options):
 def render_reference(label, scene, spp, warp="field", **options):
     """Options that name an image to measure against, for scenes where plain path tracing would take too long to find the light."""
     image = folder_of(label) / "reference.exr"
-    run(label, "render", scene, "--warp", warp, "-o", image, *arguments({"seed": 999, "spp": spp, **options}, fixed=("seed", "spp", "uniform")))
+    run(label, "render", scene, "--warp", warp, "-o", image, *arguments({"seed": 999, "spp": spp, **options}, fixed=("seed", "spp", "uniform_share")))
     return {"reference": image}
 
 

@@ -3,6 +3,7 @@
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "family/training_options.h"
+#include "options.h"
 #include "render/render_options.h"
 #include "scene/scene.h"
 #include "tracer/tracer.h"
@@ -40,6 +42,16 @@ void set_all(const std::vector<Option>& table, const Texts& options) {
     std::replace(dashed.begin(), dashed.end(), '_', '-');
     find_option(table, dashed).set(text, name);
   }
+}
+
+std::vector<OptionRow> scene_options() {
+  SceneRequest request;
+  return option_rows(scene_option_table(request));
+}
+
+std::vector<OptionRow> render_options() {
+  RenderSettings settings;
+  return option_rows(render_option_table(settings));
 }
 
 LoadedScene load(const std::filesystem::path& file, std::vector<std::pair<std::string, std::string>> parameters,
@@ -126,6 +138,9 @@ NB_MODULE(_renderer, m) {
       .def_ro("non_finite", &RenderedImage::non_finite)
       .def_ro("choice", &RenderedImage::choice);
 
+  m.def("scene_options", scene_options,
+        "(name, group, help, values, default, families) of each; families is empty: all");
+  m.def("render_options", render_options, "the same of the options of a render");
   m.def("load", load, "file"_a, "parameters"_a, "options"_a);
   m.def("render", render, "scene"_a, "warp"_a, "options"_a, "training"_a);
 }

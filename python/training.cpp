@@ -21,6 +21,7 @@
 #include "family/fit.h"
 #include "family/training_options.h"
 #include "family/warp_file.h"
+#include "options.h"
 #include "warp/scratch.h"
 
 namespace warpath::python {
@@ -147,18 +148,9 @@ void log_density(const Trained& trained, const Rows<const double>& y, const Numb
   });
 }
 
-/// The rows of the table of options, spelled as in Python.
-std::vector<std::tuple<std::string, std::string, std::string, std::string, std::string, std::vector<std::string>>>
-training_options() {
-  std::vector<std::tuple<std::string, std::string, std::string, std::string, std::string, std::vector<std::string>>>
-      rows;
+std::vector<OptionRow> training_options() {
   TrainSettings settings;
-  for (const Option& option : training_option_table(settings)) {
-    std::string name = option.name;
-    std::replace(name.begin(), name.end(), '-', '_');
-    rows.emplace_back(name, option.group, option.help, option.domain(), option.defaults(), users_of(option));
-  }
-  return rows;
+  return option_rows(training_option_table(settings), [](const Option& option) { return users_of(option); });
 }
 
 /// Name, kind, bounce and size of each group.

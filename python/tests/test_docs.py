@@ -15,6 +15,12 @@ def test_the_api_reference_is_what_the_docstrings_say():
     assert written == (SOURCE / "docs" / "api.md").read_text(), "run docs/make_api.py > docs/api.md"
 
 
+def test_the_guide_lists_the_options_that_there_are():
+    pytest.importorskip("warpath._renderer", reason="the renderer is not built in")
+    done = subprocess.run([sys.executable, SOURCE / "docs" / "make_options.py", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_the_tutorial_runs_and_keeps_its_promises(tmp_path):
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
     environment = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}

@@ -1,0 +1,29 @@
+#pragma once
+#include <algorithm>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/option.h"
+
+namespace warpath::python {
+
+/// (name, group, help, values, default, families) of an option; the name as in Python.
+using OptionRow = std::tuple<std::string, std::string, std::string, std::string, std::string, std::vector<std::string>>;
+
+/// The rows of a table of options; families_of tells who uses one, and has nobody for an option of every method.
+std::vector<OptionRow> option_rows(const std::vector<Option>& table, const auto& families_of) {
+  std::vector<OptionRow> rows;
+  for (const Option& option : table) {
+    std::string name = option.name;
+    std::replace(name.begin(), name.end(), '-', '_');
+    rows.emplace_back(name, option.group, option.help, option.domain(), option.defaults(), families_of(option));
+  }
+  return rows;
+}
+
+inline std::vector<OptionRow> option_rows(const std::vector<Option>& table) {
+  return option_rows(table, [](const Option&) { return std::vector<std::string>(); });
+}
+
+}  // namespace warpath::python
