@@ -109,7 +109,8 @@ def test_as_a_plugin():
     "call, text",
     [
         (lambda: warpath.mitsuba.render(box(), 1, "kdtree:bounce1.light"), "bounce1.light_uv means both"),
-        (lambda: warpath.mitsuba.render(box(), 1, "kdtree", epq=1), "unknown option 'epq'"),
+        (lambda: warpath.mitsuba.render(box(), 1, "kdtree", epq=1), 'unknown option "epq"; did you mean "epp"?'),
+        (lambda: warpath.mitsuba.render(box(), 1, "kdtree", couplings=3), "couplings: kdtree does not use it; it is for realnvp"),
         (lambda: warpath.mitsuba.render(box(), 1, "kdtee"), 'unknown warp "kdtee"'),
         (lambda: warpath.mitsuba.render(box("direct"), 1, "kdtree:bounce2"), "one bounce"),
         (lambda: warpath.mitsuba.train(box(), "uniform:film"), "nothing to train"),

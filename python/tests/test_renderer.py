@@ -30,7 +30,9 @@ def box():
 @pytest.mark.parametrize("warp", ["uniform:film", "kdtree:film+bounce1", "grid:bounce1.light_uv+bounce1", "field", "auto"])
 def test_every_method_has_the_expectation_of_path_tracing(box, warp):
     """Means of 16 x 16 pixels in units of their own errors: none of 18 beyond 5.5 (by chance in 1e6)."""
-    plain, warped = (warpath.render(box, spp=256 if w == "none" else 64, warp=w, epp=0.5, seed=3 + len(w)) for w in ("none", warp))
+    training = {"epp": 0.5} if warp.startswith(("kdtree", "grid")) else {}
+    plain = warpath.render(box, spp=256, seed=7)
+    warped = warpath.render(box, spp=64, warp=warp, seed=3 + len(warp), **training)
 
     def bins(x):
         return x.reshape(2, 16, 3, 16, 3).mean((1, 3))
@@ -47,6 +49,12 @@ def test_an_image_knows_how_it_was_made(box):
     assert image.samples.shape == (32, 48) and np.all(image.samples == 4) and image.spp == 4
     assert image.seconds > 0 and image.non_finite == 0
     assert (box.width, box.height, box.max_depth) == (48, 32, 4) and box.emitters >= 1
+
+
+def test_the_scene_says_how_many_samples_unless_the_caller_does():
+    scene = warpath.load_scene(BOX, size=(8, 8), max_depth=2, spp=3)
+    assert warpath.render(scene).spp == warpath.render(scene, spp=None).spp == scene.spp == 3
+    assert warpath.render(scene, spp=2).spp == 2
 
 
 def test_same_seed_same_bits(box):
@@ -78,10 +86,15 @@ def test_parameters_and_crop_of_the_scene():
     "call, error, text",
     [
         (lambda box: warpath.render(box, warp="knn"), ValueError, 'unknown warp "knn"'),
-        (lambda box: warpath.render(box, sampler="halton"), ValueError, 'unknown sampler "halton"'),
-        (lambda box: warpath.render(box, objective="psnr"), ValueError, 'unknown objective "psnr"'),
+        (lambda box: warpath.render(box, sampler="halton"), ValueError, 'sampler: unknown value "halton"; known: independent'),
+        (lambda box: warpath.render(box, objective="psnr"), ValueError, 'objective: unknown value "psnr"; known: mse, relmse'),
         (lambda box: warpath.render(box, sampler="sobol", warp="uniform:film"), ValueError, "its samples are independent"),
-        (lambda box: warpath.render(box, epq=1), ValueError, "unknown option 'epq'"),
+        (lambda box: warpath.render(box, epq=1), ValueError, 'unknown option "epq"; did you mean "epp"?'),
+        (lambda box: warpath.render(box, spp=0), ValueError, 'spp: "0" is not a whole number, 1 to'),
+        (lambda box: warpath.render(box, time=float("inf")), ValueError, "time: "),
+        (lambda box: warpath.render(box, seed=-1), ValueError, 'seed: "-1" is not a whole number'),
+        (lambda box: warpath.render(box, warp="field", couplings=3), ValueError, "couplings: field does not use it; it is for realnvp"),
+        (lambda box: warpath.render(box, warp="kdtree", uniform=0.1), ValueError, "uniform is now called uniform_share"),
         (lambda box: warpath.load_scene("none.xml"), OSError, "none.xml"),
         (lambda box: warpath.load_scene(BOX, crop=(0, 0, 9999, 1)), ValueError, "not inside the film"),
     ],

@@ -69,8 +69,11 @@ def test_targets_that_are_no_numbers_count_as_zero():
     [
         (lambda: warpath.Layout("flim"), 'unknown dimension "flim"'),
         (lambda: warpath.train(candidates(), "gird"), 'did you mean "grid"'),
-        (lambda: warpath.train(candidates(), "grid", epq=1), "unknown option 'epq'; known: alpha"),
-        (lambda: warpath.train(candidates(), "realnvp", loss="chi2"), 'loss is "chi2", not variance or likelihood'),
+        (lambda: warpath.train(candidates(), "grid", epq=1), 'unknown option "epq"; did you mean "epp"?'),
+        (lambda: warpath.train(candidates(), "realnvp", loss="chi2"), 'loss: unknown value "chi2"; known: variance, likelihood'),
+        (lambda: warpath.train(candidates(), "realnvp", rate=float("nan")), 'rate: "nan" is not a number, above 0 to 1'),
+        (lambda: warpath.train(candidates(), "grid", couplings=3), "couplings: grid does not use it; it is for realnvp, spline"),
+        (lambda: warpath.train(candidates(), "grid", uniform=0.1), "uniform is now called uniform_share"),
         (lambda: warpath.Candidates("film", 10).primary_samples(5, 6), "not so many candidates"),
     ],
 )
