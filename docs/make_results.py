@@ -61,7 +61,7 @@ def name_of(row):
 
 def table(words):
     """Lines: the table that the words ask for, and what it is of."""
-    places, keys, *only = (part.strip() for part in words.split("|"))
+    places, keys, *only = (part.strip() for part in " ".join(words.split()).split("|"))
     sources = [rows_at(place) for place in places.split(",")]
     names = [name.replace("\\,", ",") for name in re.split(r"(?<!\\),", keys)]
     first, *columns = ([part.strip() for part in name.split(" as ")] for name in names)

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "nn/residual_net.h"
-#include "warp/flow_settings.h"
 #include "warp/coupling_flow.h"
+#include "warp/flow_settings.h"
 
 namespace warpath::realnvp {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include "nn/residual_net.h"
-#include "warp/flow_settings.h"
 #include "warp/coupling_flow.h"
+#include "warp/flow_settings.h"
 
 namespace warpath::spline {
 
