@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT / "experiments"))
 import markdown
 
 WIDTH = 120
-MARKER = re.compile(r"(<!-- (table|text): (.*?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+MARKER = re.compile(r"(<!-- (table|text): (.*?)\s-->\n)(.*?)(<!-- end -->)", re.DOTALL)
 #: What stands below a table.
 CAPTION = "{commands}{settings}; build {build} of {date}, {machine}."
 
