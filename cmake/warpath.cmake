@@ -50,6 +50,9 @@ function(warpath_folder NAME)
   endif()
 endfunction()
 
+# Seconds after which a test hangs: ten times what the longest takes on a busy machine.
+set(WARPATH_TEST_TIMEOUT 3000)
+
 # warpath_test(NAME SOURCES... [ONE_PROCESS]): a GoogleTest binary with one ctest entry for each of its tests; with ONE_PROCESS one
 # entry for all of them, for tests that share what is costly to make.
 function(warpath_test NAME)
@@ -61,8 +64,8 @@ function(warpath_test NAME)
   target_compile_definitions(${NAME} PRIVATE WARPATH_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   if(test_ONE_PROCESS)
     add_test(NAME ${NAME} COMMAND ${NAME})
-    set_tests_properties(${NAME} PROPERTIES TIMEOUT 900)
+    set_tests_properties(${NAME} PROPERTIES TIMEOUT ${WARPATH_TEST_TIMEOUT})
   else()
-    gtest_discover_tests(${NAME} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 900)
+    gtest_discover_tests(${NAME} DISCOVERY_TIMEOUT 600 PROPERTIES TIMEOUT ${WARPATH_TEST_TIMEOUT})
   endif()
 endfunction()

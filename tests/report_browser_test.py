@@ -22,6 +22,8 @@ FLAGS = [
     "--disable-component-update", "--disable-sync", "--hide-scrollbars", "--remote-debugging-pipe",
 ]
 OPTIONS = argparse.Namespace()
+#: Seconds without an answer after which the browser hangs.
+PATIENCE = 600
 
 
 class Browser:
@@ -71,7 +73,7 @@ class Browser:
         if session:
             message["sessionId"] = session
         os.write(self.output, json.dumps(message).encode() + b"\0")
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + PATIENCE
         while True:
             answer = self._message(deadline)
             if answer.get("id") == self.last_id:
@@ -93,7 +95,7 @@ class Page:
             self.send(f"{domain}.enable")
         self.resize(width, height)
         self.send("Page.navigate", url=path.as_uri())
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + PATIENCE
         while not self.evaluate("document.readyState === 'complete' && location.href !== 'about:blank'"):
             if time.monotonic() > deadline:
                 raise TimeoutError(f"{path} was not loaded")
