@@ -50,7 +50,7 @@ function(warpath_folder NAME)
   endif()
 endfunction()
 
-# Seconds after which a test hangs: ten times what the longest takes on a busy machine.
+# Seconds after which a test is taken to hang, on a machine ten times slower too.
 set(WARPATH_TEST_TIMEOUT 3000)
 
 # warpath_test(NAME SOURCES... [ONE_PROCESS]): a GoogleTest binary with one ctest entry for each of its tests; with ONE_PROCESS one
@@ -66,6 +66,6 @@ function(warpath_test NAME)
     add_test(NAME ${NAME} COMMAND ${NAME})
     set_tests_properties(${NAME} PROPERTIES TIMEOUT ${WARPATH_TEST_TIMEOUT})
   else()
-    gtest_discover_tests(${NAME} DISCOVERY_TIMEOUT 600 PROPERTIES TIMEOUT ${WARPATH_TEST_TIMEOUT})
+    gtest_discover_tests(${NAME} NO_PRETTY_VALUES DISCOVERY_TIMEOUT 600 PROPERTIES TIMEOUT ${WARPATH_TEST_TIMEOUT})
   endif()
 endfunction()
