@@ -112,7 +112,7 @@ class Integrator {
   /// Independent points that follow the warp, with weights 1 / density: any number, no f, no iteration. Each call has
   /// new ones.
   void sample(Batch<double> x, std::span<double> weight);
-  /// weight[i] = 1 / density of x[i], a point within the bounds.
+  /// weight[i] = 1 / density of x[i]; infinite outside of the bounds, where nothing is drawn.
   void weights(Batch<const double> x, std::span<double> weight) const;
 
   std::string warp() const;  ///< what draws now: `uniform`, `grid`, `grid+spline`, ...

@@ -224,3 +224,15 @@ def test_types_are_installed():
     folder = pathlib.Path(warpath.__file__).parent
     assert (folder / "py.typed").exists()
     assert "class Integrator" in (folder / "_core.pyi").read_text()
+
+
+def test_nothing_is_drawn_outside_of_the_bounds():
+    integrator = warpath.Integrator([(0, 2), (-1, 1)], warp="grid")
+    inside, outside = np.array([[0.0, -1.0], [2.0, 1.0], [1.0, 0.0]]), np.array([[-1e-9, 0.0], [1.0, 1.5], [np.nan, 0.0], [np.inf, 0.0]])
+    assert np.allclose(integrator.density(inside), 0.25) and np.all(integrator.density(outside) == 0)
+
+
+@pytest.mark.parametrize("values", [lambda x: x[:, 0] + 1j, lambda x: np.ones((len(x), 2), complex)])
+def test_complex_values_are_refused_and_not_cut_short(values):
+    with pytest.raises(TypeError, match="two integrals"):
+        warpath.Integrator([(0, 1)])(values, nitn=1, neval=1000)

@@ -31,6 +31,8 @@ class Integrand:
             # Whoever looks into what went wrong finds the points there.
             error.batch = x  # type: ignore[attr-defined]
             raise
+        if np.iscomplexobj(values):
+            raise TypeError("the integrand returned complex values; integrate their real and imaginary parts as two integrals")
         if values.ndim == 0 or values.shape[0] != len(x):
             raise ValueError(f"the integrand returned an array of shape {values.shape} for {len(x)} points; its first axis must be theirs")
         if self.shape is None:
@@ -41,7 +43,13 @@ class Integrand:
 
     def _values(self, x: np.ndarray) -> np.ndarray:
         if self._kind == "rbatch":
-            return np.moveaxis(np.asarray(self._f(np.ascontiguousarray(x.T)), dtype=float), -1, 0)
+            return np.moveaxis(_numbers(self._f(np.ascontiguousarray(x.T))), -1, 0)
         if self._kind == "scalar":
-            return np.array([self._f(point) for point in x], dtype=float)
-        return np.asarray(self._f(x), dtype=float)
+            return _numbers([self._f(point) for point in x])
+        return _numbers(self._f(x))
+
+
+def _numbers(values: Any) -> np.ndarray:
+    """As floats; complex values stay so, since a cast would drop their imaginary parts."""
+    array = np.asarray(values)
+    return array if np.iscomplexobj(array) else np.asarray(array, dtype=float)

@@ -112,7 +112,7 @@ class Integrator:
         return Sample(x, weight, 1 / weight)
 
     def density(self, x: np.ndarray) -> np.ndarray:
-        """The density with which the warp draws each of N x D points."""
+        """The density with which the warp draws each of N x D points; 0 outside of the bounds."""
         x = np.ascontiguousarray(x, dtype=float)
         weight = np.empty(len(x))
         self._core.weights(x, weight)

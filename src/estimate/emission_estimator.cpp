@@ -98,9 +98,8 @@ std::uint64_t EmissionEstimator::add_pass(int spp, const std::function<bool()>& 
       batch.film_y[i] = place.y;
       place_in_pixel(film, m_pixels[(begin + i) / grid.cells()], batch.film_x[i], batch.film_y[i]);
     }
-    static const Layout uniform;
     batch.latents.assign(m_seed, batch.ids);
-    WarpedSource source(batch.latents, uniform, {}, {}, batch.film_x, batch.film_y);
+    WarpedSource source(batch.latents, batch.film_x, batch.film_y);
     m_tracer.trace_emission(source, n, batch.results);
   };
   const auto merge = [&](RayBatch& batch, std::size_t) {

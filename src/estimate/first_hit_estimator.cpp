@@ -35,9 +35,8 @@ FirstHitImages estimate_first_hits(const Tracer& tracer, int rays, std::uint64_t
       job.film_x[i] = film_position(x, sample_float(key, 0), film.crop_width);
       job.film_y[i] = film_position(static_cast<std::uint32_t>(row), sample_float(key, 1), film.crop_height);
     }
-    static const Layout uniform;
     const Latents latents(seed, job.ids);
-    WarpedSource source(latents, uniform, {}, {}, job.film_x, job.film_y);
+    WarpedSource source(latents, job.film_x, job.film_y);
     tracer.trace_first_hits(source, lanes, job.hits);
   };
   const auto merge = [&](Job& job, std::size_t row) {

@@ -73,8 +73,7 @@ void PathBatch::trace(const PathPass& pass) {
   } else if (pass.proposal) {
     trace_from(WarpedSource(m_latents, *pass.layout, m_y.batch(), m_inv_q, m_film_x, m_film_y));
   } else {
-    static const Layout uniform;
-    trace_from(WarpedSource(m_latents, uniform, {}, {}, m_film_x, m_film_y));
+    trace_from(WarpedSource(m_latents, m_film_x, m_film_y));
   }
 }
 

@@ -10,6 +10,13 @@ WarpedSource::WarpedSource(const Latents& latents, const Layout& layout, Batch<c
       m_film_x(film_x),
       m_film_y(film_y) {}
 
+namespace {
+const Layout kNothingWarped;
+}
+
+WarpedSource::WarpedSource(const Latents& latents, std::span<const float> film_x, std::span<const float> film_y)
+    : WarpedSource(latents, kNothingWarped, {}, {}, film_x, film_y) {}
+
 bool WarpedSource::draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0,
                         float* u1, float* inv_q) {
   if (group.kind != GroupKind::film) return m_fixed.draw(group, lanes, context, u0, u1, inv_q);

@@ -17,6 +17,8 @@ class WarpedSource final : public PrimarySource {
   /// uniform.
   WarpedSource(const Latents& latents, const Layout& layout, Batch<const double> y, std::span<const float> inv_q,
                std::span<const float> film_x, std::span<const float> film_y);
+  /// Positions on a stratified film, and uniform numbers for all else.
+  WarpedSource(const Latents& latents, std::span<const float> film_x, std::span<const float> film_y);
   bool draw(Group group, std::span<const std::uint32_t> lanes, const VertexContext* context, float* u0, float* u1,
             float* inv_q) override;
 

@@ -105,6 +105,12 @@ struct Integrator::State {
       now.examples.weight[i] = static_cast<float>(std::min(now.values[i] * scale, 1e30));
   }
 
+  bool holds(std::span<const double> x) const {
+    for (std::size_t d = 0; d < bounds.size(); ++d)
+      if (!(x[d] >= bounds[d].low && x[d] <= bounds[d].high)) return false;
+    return true;
+  }
+
   double to_unit(std::size_t d, double x) const {
     return std::clamp((x - bounds[d].low) / (bounds[d].high - bounds[d].low), 0.0, 1 - 0x1p-53);
   }
@@ -214,7 +220,8 @@ void Integrator::weights(Batch<const double> x, std::span<double> weight) const 
       for (std::size_t d = 0; d < dims; ++d) y(i, d) = m_state->to_unit(d, x(begin + i, d));
     const std::span<double> log_q = weight.subspan(begin, rows);
     proposal->log_density(y.batch(), log_q);
-    for (double& value : log_q) value = m_state->volume * std::exp(-value);
+    for (std::size_t i = 0; i < rows; ++i)
+      log_q[i] = m_state->holds(x.row(begin + i)) ? m_state->volume * std::exp(-log_q[i]) : HUGE_VAL;
   });
 }
 
