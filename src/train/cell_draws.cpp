@@ -16,14 +16,14 @@ double whole(const CellDraws& draws) { return std::accumulate(draws.with_share.b
 
 }  // namespace
 
-void CellDraws::add(float term, float inv_q, float inv_own) {
+void CellDraws::add(float term, float inv_q) {
   if (learned > 0) {
     // A draw that outshines all others would choose alone.
     const float bound = n > 0 ? static_cast<float>(kOutshines * sum / n) : 0.0f;
     const float f = std::min(term, bound);
-    // The field's own q is 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other
+    // q is 1 + learned (p - 1), where p is the learned density: so p is known, and q with any other
     // share.
-    const float q = 1 / inv_q, beyond_1 = std::max((1 / inv_own - 1) / learned, -1.0f);
+    const float q = 1 / inv_q, beyond_1 = std::max((q - 1) / learned, -1.0f);
     for (std::size_t s = 0; s < with_share.size(); ++s)
       with_share[s] += f * f * q / (1 + (1 - kUniformShares[s]) * beyond_1);
   }

@@ -13,8 +13,8 @@ struct CellDraws {
   std::array<float, kUniformShares.size()> with_share{};
   float learned = 0;  ///< share of the learned density in the field of this pass; 0: there is none
 
-  /// term: f / q with the q of the draw, inv_q its inverse; inv_own: that of the field.
-  void add(float term, float inv_q, float inv_own);
+  /// term: f / q with the q of the draw, inv_q its inverse.
+  void add(float term, float inv_q);
   /// Draws of the passes to come are from a new density, of which the learned one has this share.
   void begin_pass(double learned_share);
   void halve();

@@ -11,10 +11,10 @@ TEST(CellDraws, SumsTellMeanAndEffectiveDraws) {
   CellDraws draws;
   EXPECT_EQ(draws.mean(), 0);
   EXPECT_EQ(draws.effective(), 0);
-  for (const float term : {1.0f, 1.0f, 1.0f, 1.0f, 0.0f}) draws.add(term, 1, 1);
+  for (const float term : {1.0f, 1.0f, 1.0f, 1.0f, 0.0f}) draws.add(term, 1);
   EXPECT_DOUBLE_EQ(draws.mean(), 0.8);
   EXPECT_DOUBLE_EQ(draws.effective(), 4) << "a draw of nothing tells nothing";
-  draws.add(100, 1, 1);
+  draws.add(100, 1);
   EXPECT_NEAR(draws.effective(), 104.0 * 104 / 10004, 1e-12) << "one outshines all others";
   draws.halve();
   EXPECT_DOUBLE_EQ(draws.n, 3);
@@ -24,7 +24,7 @@ TEST(CellDraws, SumsTellMeanAndEffectiveDraws) {
 
 TEST(CellDraws, NothingIsSaidOfSharesUntilADensityIsLearned) {
   CellDraws draws;
-  draws.add(2, 0.5f, 0.5f);
+  draws.add(2, 0.5f);
   for (const float square : draws.with_share) EXPECT_EQ(square, 0);
 }
 
@@ -33,9 +33,9 @@ TEST(CellDraws, NothingIsSaidOfSharesUntilADensityIsLearned) {
 // (f / q)^2 q / (u + (1 - u) 3).
 TEST(CellDraws, SecondMomentsOfOtherSharesAreThoseOfTheirDensities) {
   CellDraws draws;
-  draws.add(2, 1, 1);
+  draws.add(2, 1);
   draws.begin_pass(0.6);
-  draws.add(2, 1 / 2.2f, 1 / 2.2f);
+  draws.add(2, 1 / 2.2f);
   for (std::size_t s = 0; s < kUniformShares.size(); ++s) {
     const float u = kUniformShares[s];
     EXPECT_NEAR(draws.with_share[s], 4 * 2.2f / (u + (1 - u) * 3), 1e-5) << s;
@@ -46,23 +46,13 @@ TEST(CellDraws, SecondMomentsOfOtherSharesAreThoseOfTheirDensities) {
   EXPECT_FLOAT_EQ(draws.with_share[0], before / 2) << "drawn with a density that is no more";
 }
 
-// Of the draw is 1 / q, of the field 1 / own: a pass of uniform numbers tells of the field's shares, too.
-TEST(CellDraws, DrawsOfAnotherDensityTellOfTheFieldsShares) {
-  CellDraws draws;
-  draws.add(2, 1, 1);
-  draws.begin_pass(0.6);
-  draws.add(2, 1, 1 / 2.2f);
-  const float u = kUniformShares[1];
-  EXPECT_NEAR(draws.with_share[1], 4 / (u + (1 - u) * 3), 1e-5);
-}
-
 TEST(CellDraws, OneDrawDoesNotChooseAlone) {
   CellDraws draws;
-  draws.add(1, 1, 1);
+  draws.add(1, 1);
   draws.begin_pass(0.5);
   CellDraws bright = draws;
-  draws.add(20, 1, 1);
-  bright.add(1e6f, 1, 1);
+  draws.add(20, 1);
+  bright.add(1e6f, 1);
   EXPECT_EQ(draws.with_share, bright.with_share) << "20 times the mean is the most that counts";
   EXPECT_GT(bright.sum, draws.sum);
 }

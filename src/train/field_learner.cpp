@@ -31,14 +31,11 @@ class FieldLearner::Recorder final : public VertexRecorder {
     std::uint32_t root_key, cell;
     std::uint16_t light_bin, scatter_bin;  // kNoBin: not drawn
     float light, scatter;                  // f / q
-    float inv_q_light, inv_q_scatter;      // of the draw,
-    float inv_own_light, inv_own_scatter;  // and of the field
+    float inv_q_light, inv_q_scatter;
     FieldTree::Features at;
   };
-  /// field: where draws come from another density; else null.
-  Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree,
-           std::shared_ptr<const Field> field)
-      : m_numbers(settings.numbers), m_grids(grids), m_tree(std::move(tree)), m_field(std::move(field)) {}
+  Recorder(const FieldSettings& settings, const FieldGrids& grids, std::shared_ptr<const FieldTree> tree)
+      : m_numbers(settings.numbers), m_grids(grids), m_tree(std::move(tree)) {}
 
   void record(const VertexRecords& records) override {
     const auto holds = [&](VertexDecision which) { return holds_decision(m_numbers, which, records.bounce); };
@@ -48,17 +45,6 @@ class FieldLearner::Recorder final : public VertexRecorder {
     const std::size_t n = records.lanes.size();
     m_cells.resize(std::max(m_cells.size(), n));
     m_tree->find_cells(records.context, n, m_cells.data());
-    const float *own_light = records.inv_q_light, *own_scatter = records.inv_q_scatter;
-    if (m_field) {
-      const auto density = [&](VertexDecision which, std::size_t first, std::vector<float>& inv_q) {
-        inv_q.resize(std::max(inv_q.size(), n));
-        m_field->inverse_density(which, records.context, m_cells.data(), n, {u[first], u[first + 1], u[first + 2]},
-                                 inv_q.data());
-        return inv_q.data();
-      };
-      own_light = density(VertexDecision::light_sampling, 0, m_inv_q_light);
-      own_scatter = density(VertexDecision::scattering, 3, m_inv_q_scatter);
-    }
     for (std::size_t i = 0; i < n; ++i) {
       Entry entry;
       entry.root_key = FieldTree::root_key(records.context, i);
@@ -73,8 +59,6 @@ class FieldLearner::Recorder final : public VertexRecorder {
       entry.scatter = finite(records.scatter_return[i]);
       entry.inv_q_light = records.inv_q_light[i];
       entry.inv_q_scatter = records.inv_q_scatter[i];
-      entry.inv_own_light = own_light[i];
-      entry.inv_own_scatter = own_scatter[i];
       entries.push_back(entry);
     }
   }
@@ -85,10 +69,7 @@ class FieldLearner::Recorder final : public VertexRecorder {
   const Layout& m_numbers;
   const FieldGrids& m_grids;
   const std::shared_ptr<const FieldTree> m_tree;
-  const std::shared_ptr<const Field> m_field;
-  // Of the vertices of one bounce.
-  std::vector<std::uint32_t> m_cells;
-  std::vector<float> m_inv_q_light, m_inv_q_scatter;
+  std::vector<std::uint32_t> m_cells;  // of the vertices of one bounce
 };
 
 FieldLearner::FieldLearner(const FieldSettings& settings, int light_parts)
@@ -130,10 +111,8 @@ void FieldLearner::start_from(const Field& field) {
   }
 }
 
-std::unique_ptr<VertexRecorder> FieldLearner::make_recorder() const { return make_recorder(nullptr); }
-
-std::unique_ptr<VertexRecorder> FieldLearner::make_recorder(std::shared_ptr<const Field> field) const {
-  return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass, std::move(field));
+std::unique_ptr<VertexRecorder> FieldLearner::make_recorder() const {
+  return std::make_unique<Recorder>(m_settings, m_grids, m_tree_of_pass);
 }
 
 void FieldLearner::add_root(std::uint32_t key) {
@@ -174,12 +153,12 @@ void FieldLearner::merge(VertexRecorder& recorder) {
       CellBin& bin = m_light[e.cell * light_bins + e.light_bin];
       bin.sum += e.light;
       bin.draws += 1;
-      cell.light.add(e.light, e.inv_q_light, e.inv_own_light);
+      cell.light.add(e.light, e.inv_q_light);
     }
     CellBin& bin = m_scatter[e.cell * scatter_bins + e.scatter_bin];
     bin.sum += e.scatter;
     bin.draws += 1;
-    cell.scatter.add(e.scatter, e.inv_q_scatter, e.inv_own_scatter);
+    cell.scatter.add(e.scatter, e.inv_q_scatter);
   }
   entries.clear();
 }

@@ -25,16 +25,10 @@ class FieldLearner final : public VertexLearner {
   /// as it takes to cut it. Before the first vertex. Throws ConfigError if it cannot be of this scene.
   void start_from(const Field& field);
   std::unique_ptr<VertexRecorder> make_recorder() const override;
-  /// For passes that are drawn with another density than the field, which is what fit() gave last.
-  std::unique_ptr<VertexRecorder> make_recorder(std::shared_ptr<const Field> field) const;
   void merge(VertexRecorder& recorder) override;
   /// The field after all passes so far; cells that have seen many vertices are cut for the passes to come.
   std::shared_ptr<const Field> fit_field();
   std::shared_ptr<const VertexProposal> fit() override { return fit_field(); }
-  /// Mean of what came back to the vertices of a cell of the last field.
-  double mean(VertexDecision which, std::uint32_t cell) const {
-    return (which == VertexDecision::light_sampling ? m_cells[cell].light : m_cells[cell].scatter).mean();
-  }
 
  private:
   class Recorder;

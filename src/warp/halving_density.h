@@ -37,22 +37,6 @@ class HalvingGrid {
   /// Whether numbers that come from elsewhere are a density.
   bool is_density(std::span<const CumulativeProbability> numbers) const;
 
-  /// Nodes of the same depth: how others walk the tree with probabilities of their own.
-  struct Rank {
-    std::uint32_t first = 0;   ///< the first one's index
-    std::uint32_t levels = 0;  ///< halvings
-    std::size_t driver = 0;    ///< which number of the latent chooses the child: each chooses once at most
-    std::array<std::array<std::uint32_t, 3>, 16> place{};  ///< what a child adds to the bin's place
-  };
-  static constexpr std::uint32_t kChildren = 16;
-  std::uint32_t depth() const { return m_depth; }
-  const Rank& rank(std::uint32_t depth) const { return m_ranks[depth]; }
-  /// The node of depth `depth` on the way to a bin, and which of its children is.
-  std::uint32_t node_above(std::uint32_t bin, std::uint32_t depth) const;
-  std::uint32_t child_above(std::uint32_t bin, std::uint32_t depth) const;
-  /// The point of a bin that lies at z in [0,1) of its width, and never beyond it.
-  std::array<float, 3> point(const std::array<std::uint32_t, 3>& place, const std::array<double, 3>& z) const;
-
   /// One sample on its way from a latent through the tree, a node at a time: between two steps the memory of the next
   /// one is on its way, so that many samples that take turns do not wait for it.
   class Walk {
@@ -79,11 +63,23 @@ class HalvingGrid {
   float inverse_density(const CumulativeProbability* density, std::uint32_t bin) const;
 
  private:
+  /// Nodes of the same depth.
+  struct Rank {
+    std::uint32_t first = 0;   ///< the first one's index
+    std::uint32_t levels = 0;  ///< halvings
+    std::size_t driver = 0;    ///< which number of the latent chooses the child: each chooses once at most
+    std::array<std::array<std::uint32_t, 3>, 16> place{};  ///< what a child adds to the bin's place
+  };
   static constexpr int kNodeLevels = 4;
-  static_assert(kChildren == 1u << kNodeLevels);
+  static constexpr std::uint32_t kChildren = 1u << kNodeLevels;
   static constexpr std::uint32_t kMaxDepth = kMaxLevels / kNodeLevels;
   /// Which of the first number's parts a bin lies in.
   std::uint32_t part_of(std::uint32_t bin) const;
+  /// The node of depth `depth` on the way to a bin, and which of its children is.
+  std::uint32_t node_above(std::uint32_t bin, std::uint32_t depth) const;
+  std::uint32_t child_above(std::uint32_t bin, std::uint32_t depth) const;
+  /// The point of a bin that lies at z in [0,1) of its width, and never beyond it.
+  std::array<float, 3> point(const std::array<std::uint32_t, 3>& place, const std::array<double, 3>& z) const;
 
   int m_levels;
   std::uint32_t m_parts;
