@@ -99,6 +99,14 @@ PLASTIC = bsdf("roughplastic", rgb("diffuse_reflectance", "0.1 0.3 0.6"), num("a
 
 
 def cases():
+    yield from lobe_cases()
+    yield from principled_cases()
+    yield from nesting_cases()
+    yield from map_cases()
+    yield from texture_cases()
+
+
+def lobe_cases():
     yield "diffuse", DIFFUSE
     yield "conductor none", bsdf("conductor")
     yield "conductor Cu", bsdf("conductor", text("material", "Cu"), rgb("specular_reflectance", "0.9 0.8 0.7"))
@@ -138,6 +146,8 @@ def cases():
     )
     yield "roughplastic rough", bsdf("roughplastic", num("alpha", 0.6), text("distribution", "ggx"))
 
+
+def principled_cases():
     base = rgb("base_color", "0.8 0.3 0.1")
     yield "principled", bsdf("principled", base)
     yield "principled metallic", bsdf("principled", base, num("metallic", 0.7), num("roughness", 0.3))
@@ -159,6 +169,8 @@ def cases():
     )
     yield "principled textured", bsdf("principled", bitmap("base_color"), bitmap("roughness", file="pattern_grey.png"))
 
+
+def nesting_cases():
     yield "twosided", bsdf("twosided", DIFFUSE)
     yield "twosided plastic", bsdf("twosided", PLASTIC)
     yield "twosided anisotropic", bsdf("twosided", ANISOTROPIC)
@@ -174,6 +186,8 @@ def cases():
     yield "blend checkerboard", bsdf("blendbsdf", texture("weight", "checkerboard", TO_UV), DIFFUSE, GOLD)
     yield "null", bsdf("null")
 
+
+def map_cases():
     bumps = bitmap("", flag("raw", True), file="pattern_grey.png")
     normals = bitmap("normalmap", flag("raw", True), file="normals.png")
     yield "bumpmap", bsdf("bumpmap", bumps, num("scale", 0.02), DIFFUSE)
@@ -191,6 +205,8 @@ def cases():
         "normalmap", normals, flag("use_shadowing_function", False), flag("flip_invalid_normals", False), GOLD
     )
 
+
+def texture_cases():
     for wrap in ("repeat", "mirror", "clamp"):
         for filter_type in ("nearest", "bilinear"):
             yield f"bitmap {wrap} {filter_type}", bsdf(
