@@ -267,6 +267,16 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertEqual(os.path.exists(image), code == 0)
 
+    def test_passes_that_cannot_be_rendered_are_refused(self):
+        good = {"spp": 2, "batches": 3, "teaches": True, "drawn_by": "field", "chosen": ""}
+        with tempfile.TemporaryDirectory() as elsewhere:
+            record = os.path.join(elsewhere, "results.json")
+            for wrong in ({"spp": 0}, {"spp": -4}, {"spp": 2**30}, {"batches": 0}, {"drawn_by": "magic"}):
+                run = {"method": "field", "size": "32x24", "seed": 0, "passes": [good, good | wrong]}
+                with open(record, "w") as file:
+                    json.dump({"results": [run]}, file)
+                self.fails(3, "render", BOX, "--warp", "field", "--size", "32x24", "--replay", record, "-o", self.path("a.exr"), says=["passes"])
+
     def test_interrupt_leaves_the_image_so_far(self):
         out = self.path("out.exr")
         terminal, errors = os.openpty()

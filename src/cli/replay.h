@@ -13,7 +13,8 @@ namespace warpath {
 class Replay {
  public:
   explicit Replay(const std::filesystem::path& results);  ///< reads it whole; throws FileError
-  /// Throws ConfigError if there is no run of this method (as it is typed) with this seed and size (WxH).
+  /// Throws FileError for passes that cannot be rendered, and ConfigError if there is no run of this method (as it is
+  /// typed) with this seed and size (WxH).
   const std::vector<PassRecord>& passes(const std::string& method, std::uint64_t seed, const std::string& size) const;
 
  private:
