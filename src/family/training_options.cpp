@@ -14,6 +14,13 @@ namespace {
 constexpr char kFitted[] = "fitted";
 constexpr char kTrained[] = "trained";
 
+// What options were called: all of that name, and that of one family.
+struct Renamed {
+  const char *before, *now;
+};
+constexpr Renamed kUniform{"uniform", "uniform-share"}, kGridBins{"bins", "intervals"};
+constexpr char kGrid[] = "grid";
+
 bool is_user(const Family& family, const std::string& user, bool trained) {
   if (user == kFitted) return family.joint() && family.joint()->learns();
   if (user == kTrained) return trained && family.learns();
@@ -194,8 +201,8 @@ std::string TrainingOptions::spelled(const std::string& name) const { return spe
 void TrainingOptions::set(const std::string& name, const std::string& text) {
   std::string dashed = name;
   std::replace(dashed.begin(), dashed.end(), '_', '-');
-  if (dashed == "uniform")
-    throw ConfigError(fmt::format("{} is now called {}", spelled(dashed), spelled("uniform-share")));
+  if (dashed == kUniform.before)
+    throw ConfigError(fmt::format("{} is now called {}", spelled(dashed), spelled(kUniform.now)));
   TrainSettings scratch;
   const auto table = training_option_table(scratch);
   const Option& option = find_option(table, dashed);
@@ -213,9 +220,11 @@ void TrainingOptions::check_used(const std::vector<std::string>& families, bool 
   for (const auto& [name, text] : m_given) {
     const auto users = users_of(find_option(table, name), trained);
     const auto is_user = [&](const std::string& f) { return std::find(users.begin(), users.end(), f) != users.end(); };
-    if (std::none_of(families.begin(), families.end(), is_user))
-      throw ConfigError(fmt::format("{}: {} {} not use it; it is for {}", spelled(name), fmt::join(families, ", "),
-                                    families.size() == 1 ? "does" : "do", alternatives(users)));
+    if (std::any_of(families.begin(), families.end(), is_user)) continue;
+    if (name == kGridBins.before && std::find(families.begin(), families.end(), kGrid) != families.end())
+      throw ConfigError(fmt::format("{} of a grid is now called {}", spelled(name), spelled(kGridBins.now)));
+    throw ConfigError(fmt::format("{}: {} {} not use it; it is for {}", spelled(name), fmt::join(families, ", "),
+                                  families.size() == 1 ? "does" : "do", alternatives(users)));
   }
 }
 

@@ -54,6 +54,14 @@ TEST(TrainingOptions, WhatNoFamilyUsesIsRefused) {
   EXPECT_THROW(options.check_used({"none"}), ConfigError);
 }
 
+TEST(TrainingOptions, WhatWasCalledOtherwiseIsToldItsName) {
+  TrainingOptions options;
+  options.set("bins", "16");
+  EXPECT_THAT([&] { options.check_used({"grid"}); },
+              ThrowsMessage<ConfigError>("bins of a grid is now called intervals"));
+  EXPECT_NO_THROW(options.check_used({"grid", "spline"}));
+}
+
 TEST(TrainingOptions, ExamplesAreForAllThatIsTrainedByItself) {
   TrainingOptions options;
   options.set("examples", "1000");
