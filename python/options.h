@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -15,9 +14,8 @@ using OptionRow = std::tuple<std::string, std::string, std::string, std::string,
 std::vector<OptionRow> option_rows(const std::vector<Option>& table, const auto& families_of) {
   std::vector<OptionRow> rows;
   for (const Option& option : table) {
-    std::string name = option.name;
-    std::replace(name.begin(), name.end(), '-', '_');
-    rows.emplace_back(name, option.group, option.help, option.domain(), option.defaults(), families_of(option));
+    rows.emplace_back(python_name(option.name), option.group, option.help, option.domain(), option.defaults(),
+                      families_of(option));
   }
   return rows;
 }

@@ -6,7 +6,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -37,11 +36,7 @@ using Texts = std::map<std::string, std::string>;
 
 /// Sets options by the rows of a table; names as in Python.
 void set_all(const std::vector<Option>& table, const Texts& options) {
-  for (const auto& [name, text] : options) {
-    std::string dashed = name;
-    std::replace(dashed.begin(), dashed.end(), '_', '-');
-    find_option(table, dashed).set(text, name);
-  }
+  for (const auto& [name, text] : options) find_option(table, option_name(name)).set(text, name);
 }
 
 std::vector<OptionRow> scene_options() {

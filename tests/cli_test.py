@@ -267,6 +267,15 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertEqual(os.path.exists(image), code == 0)
 
+    def test_a_warp_of_another_kind_is_no_start(self):
+        with tempfile.TemporaryDirectory() as elsewhere:
+            field, tree = (os.path.join(elsewhere, name) for name in ("field.warp", "tree.warp"))
+            for warp, file in (("field", field), ("kdtree:film+bounce1", tree)):
+                self.assertEqual(self.warpath("train", BOX, "--warp", warp, "-o", file, "--examples", 2048, *SMALL).returncode, 0)
+            for warp, file in (("realnvp:film+bounce1", field), ("field", tree)):
+                self.fails(2, "render", BOX, "--warp", warp, "--init", file, "-o", self.path("a.exr"), *SMALL, "--quiet",
+                           says=["--init", "cannot start"])
+
     def test_passes_that_cannot_be_rendered_are_refused(self):
         good = {"spp": 2, "batches": 3, "teaches": True, "drawn_by": "field", "chosen": ""}
         with tempfile.TemporaryDirectory() as elsewhere:

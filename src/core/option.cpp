@@ -75,6 +75,16 @@ std::string Option::defaults() const {
   return all;
 }
 
+std::string python_name(std::string name) {
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+std::string option_name(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
 const Option& find_option(const std::vector<Option>& options, std::string_view name) {
   std::vector<std::string_view> known;
   for (const Option& option : options) {

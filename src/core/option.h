@@ -41,6 +41,10 @@ struct Option {
   std::string defaults() const;
 };
 
+/// An option's name as Python has it, with _ in place of -, and as the command line has it.
+std::string python_name(std::string name);
+std::string option_name(std::string name);
+
 /// The row of that name. Throws ConfigError that suggests a similar one.
 const Option& find_option(const std::vector<Option>& options, std::string_view name);
 

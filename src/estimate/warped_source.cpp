@@ -1,6 +1,11 @@
 #include "estimate/warped_source.h"
 
 namespace warpath {
+namespace {
+
+const Layout kNothingWarped;
+
+}  // namespace
 
 WarpedSource::WarpedSource(const Latents& latents, const Layout& layout, Batch<const double> y,
                            std::span<const float> inv_q, std::span<const float> film_x, std::span<const float> film_y)
@@ -9,10 +14,6 @@ WarpedSource::WarpedSource(const Latents& latents, const Layout& layout, Batch<c
       m_inv_q(inv_q),
       m_film_x(film_x),
       m_film_y(film_y) {}
-
-namespace {
-const Layout kNothingWarped;
-}
 
 WarpedSource::WarpedSource(const Latents& latents, std::span<const float> film_x, std::span<const float> film_y)
     : WarpedSource(latents, kNothingWarped, {}, {}, film_x, film_y) {}

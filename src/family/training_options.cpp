@@ -27,10 +27,8 @@ bool is_user(const Family& family, const std::string& user, bool trained) {
   return family.name == user;
 }
 
-std::string spelled_as(TrainingOptions::Spelling spelling, std::string name) {
-  if (spelling == TrainingOptions::Spelling::command_line) return "--" + name;
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 /// Examples as the paper counts them, k x 200 x 160.
@@ -196,11 +194,12 @@ std::vector<std::string> users_of(const Option& option, bool trained) {
   });
 }
 
-std::string TrainingOptions::spelled(const std::string& name) const { return spelled_as(m_spelling, name); }
+std::string TrainingOptions::spelled(const std::string& name) const {
+  return m_spelling == Spelling::command_line ? "--" + name : python_name(name);
+}
 
 void TrainingOptions::set(const std::string& name, const std::string& text) {
-  std::string dashed = name;
-  std::replace(dashed.begin(), dashed.end(), '_', '-');
+  const std::string dashed = option_name(name);
   if (dashed == kUniform.before)
     throw ConfigError(fmt::format("{} is now called {}", spelled(dashed), spelled(kUniform.now)));
   TrainSettings scratch;
@@ -208,8 +207,7 @@ void TrainingOptions::set(const std::string& name, const std::string& text) {
   const Option& option = find_option(table, dashed);
   option.set(text, spelled(dashed));
   for (const auto& [other, value] : m_given)
-    if (std::find(option.excludes.begin(), option.excludes.end(), other) != option.excludes.end() ||
-        find_option(table, other).excludes == std::vector<std::string>{dashed})
+    if (contains(option.excludes, other) || contains(find_option(table, other).excludes, dashed))
       throw ConfigError(fmt::format("{} excludes {}", spelled(dashed), spelled(other)));
   m_given.emplace_back(dashed, text);
 }
@@ -219,9 +217,9 @@ void TrainingOptions::check_used(const std::vector<std::string>& families, bool 
   const auto table = training_option_table(scratch);
   for (const auto& [name, text] : m_given) {
     const auto users = users_of(find_option(table, name), trained);
-    const auto is_user = [&](const std::string& f) { return std::find(users.begin(), users.end(), f) != users.end(); };
-    if (std::any_of(families.begin(), families.end(), is_user)) continue;
-    if (name == kGridBins.before && std::find(families.begin(), families.end(), kGrid) != families.end())
+    const auto uses = [&](const std::string& family) { return contains(users, family); };
+    if (std::any_of(families.begin(), families.end(), uses)) continue;
+    if (name == kGridBins.before && contains(families, kGrid))
       throw ConfigError(fmt::format("{} of a grid is now called {}", spelled(name), spelled(kGridBins.now)));
     throw ConfigError(fmt::format("{}: {} {} not use it; it is for {}", spelled(name), fmt::join(families, ", "),
                                   families.size() == 1 ? "does" : "do", alternatives(users)));

@@ -25,12 +25,17 @@ std::shared_ptr<const Candidates> gather(const std::shared_ptr<const Tracer>& tr
       gather_candidates(integrand, layout, seed, end - first, progress, settings.candidates_count, first));
 }
 
+/// Throws ConfigError if a warp to start from is none that could be of the method's kind.
+void check_init(bool fits, const Method& method, const TrainSettings& settings) {
+  if (!fits)
+    throw ConfigError(fmt::format("--init {}: {} cannot start from it", settings.init.string(), method.family->name));
+}
+
 OnlineWarp online_warp(const Method& method, const TrainSettings& settings, const Tracer& tracer) {
   OnlineWarp warp;
   if (!settings.init.empty()) {
     warp.proposal = load_warp(settings.init).vertex_proposal;
-    if (!warp.proposal)
-      throw ConfigError(fmt::format("--init {}: not a {}", settings.init.string(), method.family->name));
+    check_init(warp.proposal != nullptr, method, settings);
   }
   const FilmSettings& film = tracer.scene().film;
   const LearnedScene scene{film.width, film.height, tracer.emitters()};
@@ -77,7 +82,10 @@ Fit Preparer::fit_in_chunks(const Method& method, const TrainSettings& settings,
 void Preparer::fit(const Method& method, const TrainSettings& settings, Preparation& preparation) {
   const JointFamily& family = *method.family->joint();
   std::shared_ptr<const Proposal> init;
-  if (!settings.init.empty()) init = load_warp(settings.init).proposal;
+  if (!settings.init.empty()) {
+    init = load_warp(settings.init).proposal;
+    check_init(init != nullptr, method, settings);
+  }
   if (family.learns()) preparation.candidate_count = candidate_count(settings);
   Fit fit;
   if (preparation.candidate_count > kChunk && fits_in_chunks(family) && !settings.candidates_count) {
